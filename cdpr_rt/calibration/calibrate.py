@@ -1,4 +1,5 @@
-"""Make a calibration from observations, verify it, and put it in the frame of the file."""
+"""Make a calibration from observations, verify it, and move it into the frame of the robot's
+file."""
 
 from __future__ import annotations
 
@@ -58,12 +59,12 @@ def calibrate(
     method: CalibrationMethod,
     images: Images | None = None,
 ) -> Outcome:
-    """Return the calibration that observations support; raise InvalidRequestError for too few.
+    """Return the calibration from observations; raise InvalidRequestError if they are too few.
 
     With images, camera and markers are fitted too. One fit uses all poses except faulty readings; a
     second fit also leaves out one pose in five, or blocks of time while the platform moves. Those
     poses verify the second fit, which does not use them at all, not even to find faults. Measured
-    points that the fit to all poses has found wrong do not verify either; the outcome gives their
+    points that the first fit has found wrong are not used for verification; the outcome gives their
     number. Without images, the noise of readings is estimated first.
     """
     if seen.poses < LEAST_POSES:
@@ -97,7 +98,7 @@ def calibrate(
     absolute = absolute_3_sigma(found, grid, larger)
     if known_room or all_of_it.seen.measured.any():
         absolute = absolute.with_shared_scale(grid[:, 0, : geometry.coordinates])
-    else:  # only the file determines the frame
+    else:  # the file alone determines the frame
         exits_mm = math.sqrt(max(absolute.position_mm**2 - known.position_mm**2, 0.0))
         framed = in_frame_of_file(found, geometry, grid, 1e-3 * exits_mm / 3.0)
         part = in_frame_of_file(unused.part, geometry, grid, 1e-3 * exits_mm / 3.0).found
@@ -121,17 +122,17 @@ class _Whole:
 
     fit: Fit
     weighed: CableGeometry
-    """The robot's file with the accuracy of readings that the fit has found."""
+    """Geometry of the robot's file, with the accuracy of readings that the fit has found."""
     faults: list[Fault]
     seen: Observations
-    """Observations of the fit before lengths are left out, but without wrong points."""
+    """Observations without wrong points, but with the lengths that the fit has left out."""
     verifying_left_out: int
-    """Number of wrong points at poses that would have verified the fit."""
+    """Number of wrong points at poses that would otherwise have verified the fit."""
     map: MapFit | None = None
     known_room: bool = False
-    """Whether places of markers are known in the room."""
+    """Whether poses of markers in the room are known."""
     images: Images | None = None
-    """With only those known places that agree with each other."""
+    """The images; their setup has only those known marker poses that agree with each other."""
 
 
 def _of_cables(geometry: CableGeometry, seen: Observations, slack_N: FloatArray) -> _Whole:
@@ -152,7 +153,7 @@ def _without_faults(
 
 
 def _verifying_left_out(seen: Observations, faults: list[Fault]) -> int:
-    """Return how many of the wrong points are at poses that `seen`, with them, would hold out."""
+    """Return how many wrong points are at poses that would be held out if the points were right."""
     held = held_out(seen)
     return sum(bool(held[fault.pose]) for fault in faults if fault.kind == "point")
 
@@ -164,8 +165,8 @@ def _with_camera(
     require_enough(geometry, start.seen.some(~held_out(start.seen)))
     known, of_points = without_slipped_points(geometry, start.seen, slack_N)
     told = start.camera.knowledge
-    # the given place of the camera counts only after it agrees with the readings: a wrong place
-    # would look like faults of cables, and hide them
+    # the given pose of the camera is used only after it agrees with the readings: a wrong pose
+    # would look like faults of cables, and hide real ones
     unknown = start.camera.with_hand_eye(
         told.position_m, told.rotation, np.array(UNKNOWN_HAND_EYE_STD)
     )
@@ -178,7 +179,7 @@ def _with_camera(
     found, wrong = told_right(geometry, found, start.map)
     if misplaced is not None and wrong and hand_eye_fault(found, told, wrong) is None:
         misplaced, found = None, _with_hand_eye(geometry, found, told)
-    # if the file's drums are wrong, do not hold the fit to them
+    # if the drum radii of the file are wrong, they must not constrain the fit
     believed = replace(geometry, knowledge=found.geometry.knowledge)
     found, weighed = fit_with_noise_seen(found, believed)
     readings = [one for one in faults if one.kind not in ("drum", "elongation")]
@@ -196,7 +197,7 @@ def _with_camera(
 
 
 def _with_hand_eye(geometry: CableGeometry, found: Fit, told: CameraKnowledge) -> Fit:
-    """Return the fit with the camera's place on the platform from the hand-eye file."""
+    """Return the fit with the hand-eye transform from its file."""
     assert found.camera is not None
     camera = found.camera.with_hand_eye(told.position_m, told.rotation, told.hand_eye_std)
     known = replace(geometry, knowledge=found.geometry.knowledge)
@@ -215,13 +216,14 @@ def _grid(geometry: CableGeometry) -> FloatArray:
     return geometry.model.poses(places)
 
 
-# The frame of a calibration. Lengths, and markers of unknown place, determine positions relative
-# to each other, but not the robot's place in its room. They fit equally well if all exit points
+# The frame of a calibration. Lengths, and markers at unknown poses, determine positions relative to
+# each other, but not where the robot is in its room: the residuals do not change if all exit points
 # and poses move together. Then only the robot's file determines the frame.
 
 STAND_m: Final = 0.005
 STAND_rad: Final = 0.005
-"""Standard deviations of the platform's place on its stand, where encoders start to count."""
+"""Standard deviations of the platform's position and orientation on its stand, at which the
+encoders start to count."""
 
 
 @dataclass(frozen=True)
@@ -230,10 +232,10 @@ class FrameOfFile:
 
     found: Fit
     share: float
-    """Weight of the frame given by home; the exit points' frame has the rest."""
+    """Weight of the frame given by home; the frame of the exit points has the rest of 1."""
 
     def known_to(self, relative: Predicted3Sigma) -> Predicted3Sigma:
-        """Return how well poses are known in this frame; `relative` is between poses."""
+        """Return the accuracy of poses in this frame; `relative` is the accuracy between poses."""
         turned = relative.orientation_deg
         stand_mm, stand_deg = (
             3.0 * math.sqrt(self.share) * std for std in (1e3 * STAND_m, math.degrees(STAND_rad))
@@ -249,11 +251,11 @@ def in_frame_of_file(
 ) -> FrameOfFile:
     """Return a fit moved as a whole into the frame of the robot's file.
 
-    The file determines the frame twice. First by its exit points: the fit displaces them least as a
-    whole, so that they determine the frame to `exits_std_m`. Second by home, where lengths are
-    counted from: fit and file turn the same lengths into platforms near `poses` (M, 4, 3). The
-    motion that takes one to the other (least squares over anchor points) is known to `STAND_m`.
-    The result weighs both by their variances.
+    The file determines the frame twice. The first way uses the exit points: the fit displaces them
+    as little as possible as a whole, so they determine the frame with `exits_std_m`. The second way
+    uses home, at which the lengths begin to count: fit and file compute poses near `poses` (M, 4,
+    3) from the same lengths. The rigid motion between these poses (least squares over anchor
+    points) has the accuracy `STAND_m`. The result weights both ways by their variances.
     """
     geometry = found.geometry
     if "exit" not in geometry.identified:
@@ -277,13 +279,13 @@ def in_frame_of_file(
 
 
 def position_shift(found: Fit, file: CableGeometry, poses: FloatArray) -> FloatArray:
-    """Return by how much a fit displaces positions at `poses` (M, 4, 3) on average, m, (k,)."""
+    """Return the mean displacement of positions at `poses` (M, 4, 3) by a fit, m, (k,)."""
     by_fit, by_file = _by_both(found, file, poses)
     return np.asarray((by_fit - by_file)[:, 0, : file.coordinates].mean(axis=0))
 
 
 def _by_both(found: Fit, file: CableGeometry, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the platform's poses, by fit and by file, for encoder lengths near `poses`."""
+    """Return the poses by the fit, and by the file, for the encoder lengths at `poses`."""
     geometry, seen = found.geometry, found.seen
     tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
     drum = geometry.cable[:, DRUM]

@@ -1,4 +1,4 @@
-"""Fitted parameters of a camera: its place on the platform, the size of sheets, lens, markers.
+"""Fitted parameters of a camera: pose on the platform, size of sheets, lens, and markers.
 
 The order of parameters is: position and rotation of the camera on the platform (6), relative size
 of all sheets (1), lens parameters with a standard deviation (up to 9), and position and
@@ -21,9 +21,9 @@ from cdpr_rt.calibration.markers.marker_map import SeenMarkers
 SIZE, LENS = 6, 7
 """Indices of the relative size of the sheets, and of the lens, among the parameters."""
 UNKNOWN_HAND_EYE_STD: Final = (0.5, 0.5, 0.5, 1.0, 1.0, 1.0)
-"""Prior standard deviations of a camera's unknown place on the platform, m and rad."""
+"""Prior standard deviations of a camera's unknown pose on the platform, m and rad."""
 _FREE = 10.0
-"""Standard deviation of an unknown parameter, m and rad: hardly an observation."""
+"""Standard deviation of an unknown parameter, m and rad, so large that it has little weight."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +37,20 @@ class CameraKnowledge:
     hand_eye_std: FloatArray
     """Standard deviations of both, m and rad, (6,)."""
     size_std: float
-    """Relative, of the size that all sheets share."""
+    """Relative standard deviation of the size that all sheets share."""
     lens: FloatArray
     """(9,)"""
     lens_std: FloatArray
-    """(9,), 0 for parameters that are held."""
+    """Standard deviations of the lens parameters, (9,); 0 for fixed ones."""
     known: BoolArray
-    """Markers whose place is known, (m,)."""
+    """Whether the pose of each marker is known, (m,)."""
     marker_position_m: FloatArray
-    """(m, 3); used if known."""
+    """Positions of the markers, (m, 3); used if known."""
     marker_rotation: FloatArray
     marker_std: FloatArray
-    """m and rad, (m, 6)."""
+    """Standard deviations of marker poses, m and rad, (m, 6)."""
     sigma_px: float
-    """Standard deviation that weights corners: noise and errors of the sheets."""
+    """Standard deviation used to weight corners; includes noise and errors of the sheets."""
     noise_px: float
     """Noise of corners, used to find outliers."""
 
@@ -62,7 +62,7 @@ class CameraModel:
     position_m: FloatArray
     rotation: FloatArray
     size_change: float
-    """Relative, common to all sheets, from the given size."""
+    """Relative deviation from the given size, common to all sheets."""
     lens: FloatArray
     ids: tuple[int, ...]
     marker_position_m: FloatArray
@@ -71,10 +71,10 @@ class CameraModel:
     """(m, 3, 3)"""
     knowledge: CameraKnowledge
     held: bool = False
-    """Whether it is fixed and has no parameters."""
+    """Whether the camera is fixed and has no parameters."""
 
     def with_hand_eye(self, position_m: FloatArray, rotation: FloatArray, std: FloatArray) -> Self:
-        """Return this with its place on the platform known to `std` (6,), m and rad."""
+        """Return this knowledge with a hand-eye transform known to `std` (6,), m and rad."""
         known = replace(self.knowledge, position_m=position_m, rotation=rotation, hand_eye_std=std)
         return replace(self, knowledge=known)
 
@@ -118,7 +118,7 @@ class CameraModel:
         return out[: self.size]
 
     def changed(self, step: FloatArray) -> CameraModel:
-        """Return this changed by a step (size,)."""
+        """Return this camera changed by a step (size,)."""
         if self.held:
             return self
         lens = self.lens.copy()
@@ -139,7 +139,7 @@ class CameraModel:
         return poses[:, 0] + poses[:, 1:] @ self.position_m, poses[:, 1:] @ self.rotation
 
     def views(self, seen: SeenMarkers, poses: FloatArray) -> Views:
-        """Return what the camera sees from a platform at poses (N, 4, 3), one for each image."""
+        """Return the views of the camera on a platform at poses (N, 4, 3), one for each image."""
         position, rotation = self.camera_poses(poses)
         return Views(
             (1.0 + self.size_change) * seen.corners_m,
@@ -151,12 +151,12 @@ class CameraModel:
         )
 
 
-# Terms of markers' corners in the fit: residuals, derivatives and their normal equations. A
-# corner is seen at π(R_c^T (t_m + R_m s c - p_c)) with p_c = p + Q h and R_c = Q R_h for a
-# platform at (p, Q) and a camera at (h, R_h) on it. With the derivative D by the camera's pose,
-# those by the platform's twist and by the camera's place on it are D [1, -[Q h]×; 0, 1] and D
-# [Q, 0; 0, Q]. A corner's residual is its distance over its standard deviation, with Cauchy's
-# loss of width c = 3 noise deviations: c² log(1 + (d/c)²), that is the weight 1/(1 + (d/c)²).
+# Terms of markers' corners in the fit: residuals, derivatives and their normal equations. A corner
+# is seen at π(R_c^T (t_m + R_m s c - p_c)) with p_c = p + Q h and R_c = Q R_h for a platform at (p,
+# Q) and a camera at (h, R_h) on it. If D is the derivative by the camera's pose, the derivatives by
+# the platform's twist and by the camera's pose on it are D [1, -[Q h]×; 0, 1] and D [Q, 0; 0, Q]. A
+# corner's residual is its distance over its standard deviation, with Cauchy's loss of width c = 3
+# noise deviations: c² log(1 + (d/c)²), that is the weight 1/(1 + (d/c)²).
 
 
 def corner_residuals(camera: CameraModel, seen: SeenMarkers, poses: FloatArray) -> FloatArray:
@@ -174,7 +174,8 @@ def corner_cost(camera: CameraModel, off_px: FloatArray, robust: bool) -> float:
 def corner_terms(camera: CameraModel, seen: SeenMarkers, poses: FloatArray) -> CornerTerms:
     """Return terms over standard deviations for a platform at poses (N, 4, 3), one per image.
 
-    Shared are the camera's place on the platform, the size of the sheets and the lens.
+    The shared parameters are the camera's pose on the platform, the size of the sheets and the
+    lens.
     """
     terms = camera.views(seen, poses).terms(camera.lens)
     sigma, Q = camera.knowledge.sigma_px, poses[:, 1:]

@@ -31,12 +31,12 @@ from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CameraSetup, HandEye, Observations
 from cdpr_rt.errors import InvalidRequestError
 
-# Hand-eye calibration: a camera's place on a platform from poses of both, in closed form.
-# (Q_j, p_j) are platform poses in the room, (C_j, c_j) camera poses in the frame of a map, (X, x)
-# the camera's place on the platform and (Z, z) the map's in the room. They satisfy Q_j X = Z
-# C_j and p_j + Q_j x = Z c_j + z. For two poses, Q_j^T Q_k X = X C_j^T C_k; with the rotation
-# vectors a of the platform's turn and b of the camera's, a = X b (Park and Martin 1994).
-# X is the rotation that fits best.
+# Hand-eye calibration: a camera's pose on a platform from poses of both, in closed form. (Q_j, p_j)
+# are platform poses in the room, (C_j, c_j) camera poses in the frame of a map, (X, x) the camera's
+# pose on the platform and (Z, z) the map's in the room. They satisfy Q_j X = Z C_j and p_j + Q_j x
+# = Z c_j + z. For two poses, Q_j^T Q_k X = X C_j^T C_k; with the rotation vectors a of the
+# platform's turn and b of the camera's, a = X b (Park and Martin 1994). X is the rotation that fits
+# best.
 
 _LEAST_TURN_rad = 0.02
 _ROUNDS = 5
@@ -51,7 +51,7 @@ class Rigid:
 
 
 def turned_camera(platform: FloatArray, camera: FloatArray) -> FloatArray:
-    """Return X for rotations (N, 3, 3) of platform and camera; poses that do not fit count less.
+    """Return X for rotations (N, 3, 3) of platform and camera, robust against outliers.
 
     Raises InvalidRequestError if the platform hardly turns, or turns about one axis only.
     """
@@ -75,10 +75,10 @@ def turned_camera(platform: FloatArray, camera: FloatArray) -> FloatArray:
 def rigid_places(
     platform: FloatArray, camera: Rigid, turn: FloatArray, place_m: FloatArray | None
 ) -> tuple[Rigid, Rigid]:
-    """Return the camera's place on the platform and the map's in the room.
+    """Return the camera's pose on the platform and the map's pose in the room.
 
-    `platform` (N, 4, 3) and `camera` (N, 3, 3), (N, 3) are poses, `turn` is X; `place_m` is x if
-    it is known. Least squares, reweighted so that poses that do not fit count less.
+    `platform` (N, 4, 3) and `camera` (N, 3, 3), (N, 3) are poses, `turn` is X; `place_m` is x if it
+    is known. The method is least squares, reweighted so that poses that do not fit count less.
     """
     Q, p = platform[:, 1:], platform[:, 0]
     weight = np.ones(len(p))
@@ -108,9 +108,10 @@ def _weights(off: FloatArray) -> FloatArray:
 
 
 _LIKELY_deg, _LIKELY_SIGMAS = 15.0, 6.0
-"""Largest likely error of the camera's rotation: the robot's file gives turns only roughly."""
+"""Largest likely error of the camera's rotation; it is large because rotations by the robot's file
+are inaccurate."""
 _ROOM_m, _ROOM_rad = 0.2, 0.15
-"""Known markers whose layout is displaced by no more than this are in the robot's own frame."""
+"""If the layout of known markers is displaced by at most this, it is given in the robot's frame."""
 
 
 @dataclass(frozen=True)
@@ -122,13 +123,13 @@ class CameraStart:
     geometry: CableGeometry
     seen: Observations
     known_room: bool
-    """Whether places of markers are known in the room's frame."""
+    """Whether poses of markers are known in the room's frame."""
     setup: CameraSetup
-    """The camera's, with only those known places that agree with each other."""
+    """Setup of the camera, with only those known marker poses that agree with each other."""
     place_faults: tuple[str, ...] = ()
-    """Faults of known places, as text."""
+    """Faults of known marker poses, as text."""
     contradictory_places: bool = False
-    """Whether no majority of known places agrees."""
+    """Whether no majority of the known marker poses agrees."""
 
 
 def camera_start(
@@ -139,8 +140,8 @@ def camera_start(
 ) -> CameraStart:
     """Return the starting point of the fit; there is an image for each pose of `seen`.
 
-    Known places that contradict the map are left out. Raises InvalidRequestError and BundleError
-    if the images do not determine a map or the place of the camera.
+    Known marker poses that contradict the map are left out. Raises InvalidRequestError and
+    BundleError if the images do not determine a map or the pose of the camera on the platform.
     """
     found = map_of_images(setup, sightings)
     places = consistent_places(found.map, setup.sheets, setup.known_std_m)
@@ -155,7 +156,7 @@ def camera_start(
 
 def map_of_images(setup: CameraSetup, sightings: Sequence[Sighting]) -> MapFit:
     """Return the map determined by images alone; raises InvalidRequestError and BundleError."""
-    # known places join the later fit as measurements; here they would only determine the frame
+    # the later fit uses known marker poses as measurements; here they would only set the frame
     return fit_map(sightings, setup.intrinsics, setup.sheets.model_copy(update={"known": ()}))
 
 
@@ -195,7 +196,7 @@ def start_on_map(
 def _places(
     platform: FloatArray, map_: MarkerMap, there: IntArray, setup: CameraSetup
 ) -> tuple[Rigid, Rigid]:
-    """Return the camera's place on the platform, and the map's place in the room."""
+    """Return the camera's pose on the platform, and the map's pose in the room."""
     cameras = Rigid(map_.camera_rotation[there], map_.camera_position_m[there])
     told = setup.hand_eye
     if told is None:
@@ -212,7 +213,7 @@ def _require_likely(
     """Raise InvalidRequestError if the platform's turns contradict the given camera rotation."""
     try:
         seen = turned_camera(platform, camera)
-    except InvalidRequestError:  # it hardly turns: only the given rotation is known
+    except InvalidRequestError:  # the platform hardly turns, so only the given rotation is known
         return
     off_deg = math.degrees(angles(seen.T @ turn))
     most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * told.rotation_std_deg)
@@ -230,7 +231,7 @@ def _is_small(room: Rigid, map_: MarkerMap) -> bool:
 
 
 def _moved_m(room: Rigid, map_: MarkerMap) -> float:
-    """Return how far the camera is moved by the motion that takes the map into the room."""
+    """Return how far the transform from the map's frame to the room's moves the camera."""
     at = map_.camera_position_m[map_.located]
     moved = at @ room.rotation.T + room.position_m - at
     return float(np.median(np.linalg.norm(moved, axis=1)))
@@ -253,7 +254,7 @@ def _platform_poses(
     hand_eye: Rigid,
     geometry: CableGeometry,
 ) -> FloatArray:
-    """Return poses (N, 4, 3): of located cameras if six directions are free, else rough ones."""
+    """Return poses (N, 4, 3) from located cameras if six directions are free, else rough ones."""
     poses = rough.copy()
     if len(geometry.free) == 6:
         Q = map_.camera_rotation[there] @ hand_eye.rotation.T
@@ -298,7 +299,7 @@ def _model(
 def _layout(
     setup: CameraSetup, map_: MarkerMap, room: Rigid
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return positions and rotations of markers, and whether the place of each is known."""
+    """Return positions and rotations of markers, and whether the pose of each is known."""
     count = len(map_.ids)
     position, rotation = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
     known = np.zeros(count, bool)
@@ -312,9 +313,9 @@ def _layout(
 # Poses that images determine with the marker map of an earlier calibration.
 
 _MAP_m, _MAP_rad = 5e-4, 5e-4
-"""Common error of a whole map, which no image shows."""
+"""Error common to the whole map, which images cannot show."""
 _PLACED_m = 0.05
-"""A marker whose place is less certain is not in the map."""
+"""A marker with a larger standard deviation is not in the map."""
 _LEAST_MARKERS = 2
 
 
@@ -347,7 +348,7 @@ def with_seen_poses(
 
 
 def locate_by_camera(geometry: CableGeometry, camera: CameraModel, seen: Observations) -> Fit:
-    """Return the poses determined by images alone, with the map held fixed."""
+    """Return the poses that images alone determine, with a fixed map."""
     blind = replace(
         seen.unmeasured(), used=np.zeros_like(seen.used), markers=seen.markers, jumps=()
     )
@@ -361,7 +362,7 @@ def markers_of_map(
     sheets: MarkerSheets,
     sightings: Sequence[Sighting],
 ) -> SeenMarkers:
-    """Return seen markers that have a place (m,) in a map of `ids`, for images that show two."""
+    """Return the seen markers that have a pose in a map of `ids`, from images with at least two."""
     number = {marker: k for k, marker in enumerate(ids) if placed[k]}
     rows = [
         (image, number[marker], corners)

@@ -1,13 +1,13 @@
-"""Check with a few poses whether a calibrated robot has changed, and which cable changed how.
+"""Check with a few poses whether a calibrated robot has changed, and find the changed cable.
 
-The calibrated geometry gives the poses by lengths and, if available, by camera or scanner. The
-remaining residuals are explained by changes of single cables, each linearised:
+The calibrated geometry gives the poses from lengths and, if available, from a camera or scanner.
+Changes of single cables, each linearised, explain the remaining residuals:
 
     r + P_⊥ (A θ + N ξ) ≈ 0
 
-P_⊥ takes out what poses explain. A are the derivatives by a cable's exit point, length or drum, and
-N those by the platform's place at home, from which lengths are counted. The search first takes the
-change that lowers the sum of squares most.
+P_⊥ removes the part that changes of the poses explain. A has the derivatives by a cable's exit
+point, length or drum. N has those by the platform's pose at home, at which the lengths begin to
+count. The search first takes the change that lowers the sum of squares most.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.model.cable_kernel import run_poses
 
 _HOME_m, _HOME_rad = 0.002, 0.004
-"""Standard deviation of the platform's place at home if nothing has changed."""
+"""Standard deviation of the platform's pose at home if nothing has changed."""
 _GAIN = 30.0
-"""Least reduction of the sum of squares by a change, in units of their variance."""
+"""Least reduction of the sum of squared residuals by a change, in units of their variance."""
 _EACH_PARAMETER = 6.0
-"""Additional reduction for each number that describes the change."""
+"""Additional reduction required for each parameter of the change."""
 _LEAST_NOISE = 0.1
-"""Least variance of readings, relative to the assumed one."""
+"""Least estimated variance of readings, relative to the assumed one."""
 _ALIKE = 0.8
 _MOST_CHANGES = 3
 _LARGEST = {"exit": 0.1, "length": 0.1, "drum": 0.03, "slip": 0.1}
@@ -58,16 +58,16 @@ class DetectedChange:
     """A change of the robot since it was calibrated."""
 
     kind: str
-    """exit, length, drum, or slip: a change of length from one pose of the check on."""
+    """exit, length, drum, or slip: a change of length that begins at one pose of the check."""
     cable: int
-    """Counted from 0."""
+    """Index of the cable, counted from 0."""
     size: FloatArray
     """(k,) m; relative for a drum."""
     std: FloatArray
     effect_m: float
-    """Largest error over the poses that it causes in positions computed from lengths."""
+    """Largest error, over the poses, that the change causes in positions computed from lengths."""
     who: str
-    """The cable as text, with the others that it might be."""
+    """The cable as text, with the other cables that may have changed instead."""
     alike: tuple[int, ...] = ()
     """Other cables for which a change of this kind fits nearly equally."""
     pose: int = 0
@@ -75,7 +75,7 @@ class DetectedChange:
 
     @property
     def text(self) -> str:
-        """Change, its size, and advice, as text."""
+        """The change, its size, and advice, as text."""
         who = self.who
         many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
         sure = f"± {3e3 * float(self.std.max()):.1f} mm (3 sigma)"
@@ -90,7 +90,7 @@ class DetectedChange:
         return f"{what}; {effect}: {_ADVICE[self.kind]}"
 
     def as_json(self) -> dict[str, object]:
-        """Return it for JSON, cables counted from 1."""
+        """Return the change as JSON, with cables counted from 1."""
         return {
             "kind": self.kind,
             "cable": self.cable + 1,
@@ -105,19 +105,19 @@ class DetectedChange:
 
 @dataclass(frozen=True)
 class Check:
-    """Check of a calibration by a few poses."""
+    """Result of checking a calibration at a few poses."""
 
     poses: int
     residual_m: float
-    """Root mean square of the residuals of lengths, at the poses that they determine."""
+    """Root mean square of the residuals of lengths, at the poses computed from them."""
     misfit: float
-    """Mean square of the remaining residuals over their variance, without the changes."""
+    """Mean square of the residuals that the changes do not explain, over their variance."""
     changes: tuple[DetectedChange, ...]
     wanted_m: float
 
     @property
     def effect_m(self) -> float:
-        """Error of positions by all changes together."""
+        """Error of positions due to all changes together."""
         return sum(change.effect_m for change in self.changes)
 
     @property
@@ -167,7 +167,7 @@ def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float)
 
 
 class _System:
-    """Residuals that poses do not explain, and the columns of all possible changes."""
+    """Residuals after elimination of the poses, and the columns of all possible changes."""
 
     def __init__(self, geometry: CableGeometry, at: Linearised, poses: FloatArray) -> None:
         self._geometry, self._at = geometry, at
@@ -202,7 +202,7 @@ class _System:
         self._nuisance, self._known = self._of_home(poses[0])
 
     def _of_home(self, home: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the derivative of lengths by the platform's place at home, and its deviations."""
+        """Return the derivatives of lengths by the pose at home, and its standard deviations."""
         geometry = self._geometry
         cables = np.empty((1, KERNEL_ROWS, geometry.n))
         run_poses(geometry.kernel_geometry(), home[None], cables)
@@ -224,18 +224,18 @@ class _System:
         return x[: len(own)], inverse[: len(own), : len(own)], cost
 
     def misfit(self, columns: Sequence[IntArray]) -> float:
-        """Return the mean square of the remaining residuals."""
+        """Return the mean square of the residuals that remain after these changes."""
         used = sum(len(own) for own in columns)
         return self._solve(columns)[2] / float(max(self._freedom - used, 1))
 
     def _noise(self, columns: Sequence[IntArray]) -> float:
-        """Return the variance of the remaining residuals, at most the assumed one of readings."""
+        """Return the variance of the remaining residuals, at most that assumed for readings."""
         return min(max(self.misfit(columns), _LEAST_NOISE), 1.0)
 
     def best(
         self, columns: Sequence[IntArray]
     ) -> tuple[str, int, int, tuple[int, ...], IntArray] | None:
-        """Return the change that explains most besides those taken; None if none is certain."""
+        """Return the further change that explains most of the residuals, None if not certain."""
         before = self._solve(columns)[2]
         gains = {}
         for key, own in self._own.items():
@@ -257,7 +257,7 @@ class _System:
     def sized(
         self, changes: list[DetectedChange], columns: Sequence[IntArray]
     ) -> list[DetectedChange]:
-        """Return the changes with their sizes when all are fitted together."""
+        """Return the changes with their sizes from a joint fit."""
         x, covariance, _ = self._solve(columns)
         std = np.sqrt(np.diag(covariance))
         out, first = [], 0
@@ -271,7 +271,7 @@ class _System:
     def _effect_m(self, own: IntArray, size: FloatArray) -> float:
         """Return the largest error that a change causes in positions computed from lengths."""
         at = self._at
-        # if a platform turns freely, the balance of moments gives the angle, not the lengths
+        # if a platform turns freely, the balance of moments determines the angle, not the lengths
         rows = self._geometry.n + int(self._geometry.turns_freely)
         x = at.by_pose[:, :rows]
         moved = np.einsum("jra,a->jr", self._by_parameter[:, :rows, own], size)

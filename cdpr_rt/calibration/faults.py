@@ -33,36 +33,36 @@ FaultKind = Literal[
     "drum", "elongation", "image", "marker", "camera", "lens", "size", "hand_eye", "place",
 ]  # fmt: skip
 _OUTLIER, _JUMP = 25.0, 40.0
-"""Least reduction of the sum of squared residuals by leaving a reading out, to first order."""
+"""Least first-order reduction of the sum of squared residuals if a reading is left out."""
 _LEAST_GAIN = 16.0
-"""Least reduction over the variance of the remaining residuals (F-test)."""
+"""Least ratio of that reduction to the variance of the remaining residuals (F-test)."""
 _MOST_FAULTS = 16
 _ALIKE, _MAYBE = 0.8, 0.2
 _TOLD = 0.05
-"""Least redundancy of a reading; below it, no other readings show that it is wrong."""
+"""Least redundancy of a reading; below it, the other readings cannot show that it is wrong."""
 _ENDS = 2
-"""Poses at both ends at which a jump looks like an outlier."""
+"""Number of poses at both ends at which a jump looks like an outlier."""
 _FAR = 3.0
 _UNSURE = ": lengths alone cannot show which"
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A reading or figure that contradicts the assumed robot."""
+    """A reading or given value that contradicts the model of the robot."""
 
     kind: FaultKind
     cable: int
-    """Counted from 0; -1 for all."""
+    """Index of the cable, counted from 0; -1 for all."""
     pose: int
-    """Counted from 0; -1 for all poses."""
+    """Index of the pose, counted from 0; -1 for all."""
     size: float
-    """In m; relative for drum, elongation and camera figures."""
+    """Size of the fault, m; relative for drum, elongation and values of the camera."""
     text: str
     alike: tuple[int, ...] = ()
-    """Other cables that might have the fault, by lengths alone."""
+    """Other cables that might have the fault, because lengths alone cannot tell them apart."""
 
     def as_json(self) -> dict[str, object]:
-        """Return it for JSON, cables and poses counted from 1."""
+        """Return the fault as JSON, with cables and poses counted from 1."""
         return {
             "kind": self.kind,
             "cable": self.cable + 1 or None,
@@ -76,7 +76,7 @@ class Fault:
 def without_slack(
     geometry: CableGeometry, seen: Observations, slack_N: FloatArray
 ) -> tuple[Observations, list[Fault]]:
-    """Return observations without lengths of cables that were slack according to their tensions."""
+    """Return observations without the lengths of cables that the tensions show to be slack."""
     slack = seen.used & (seen.tension_N < slack_N)
     faults = [
         Fault(
@@ -97,8 +97,8 @@ def fit_without_faults(
 ) -> tuple[Fit, list[Fault]]:
     """Return the fit of all consistent readings, and the readings that were left out, as text.
 
-    The length or measured point that contradicts the others most is left out, until none does. If
-    all later lengths of a cable are off by the same amount, they get a separate offset instead.
+    The length or measured point that contradicts the others most is left out, until all agree. If
+    all later lengths of a cable are wrong by the same amount, they get a separate offset instead.
     """
     seen, faults = without_slack(geometry, seen, slack_N)
     found = fit(geometry, seen, camera=camera)
@@ -109,7 +109,7 @@ def fit_without_faults(
         gains.append(found.total_cost - without.total_cost)
         left_out.append(fault)
         found = without
-    # readings that were outliers before others were left out may now fit
+    # outliers may fit after other readings have been left out
     least = _LEAST_GAIN * max(found.variance_factor, 1.0)
     sure = [fault for fault, gain in zip(left_out, gains, strict=True) if gain > least]
     if len(sure) < len(left_out):
@@ -124,10 +124,10 @@ def fit_without_faults(
 def without_slipped_points(
     geometry: CableGeometry, seen: Observations, slack_N: FloatArray
 ) -> tuple[Observations, list[Fault]]:
-    """Return observations without measured points if these have slipped as a whole, and how.
+    """Return observations without measured points if these have a common slip, and its text.
 
-    Then the points contradict lengths and the robot's file. Leaving out single points would blame
-    points that may be right.
+    In that case the points contradict the lengths and the robot's file. Leaving out single points
+    would reject points that may be right.
     """
     if not np.isfinite(seen.position_std_m).any():
         return seen, []
@@ -162,7 +162,7 @@ def without_slipped_points(
 def _wrong_lengths(
     geometry: CableGeometry, seen: Observations, slack_N: FloatArray, before: list[Fault]
 ) -> tuple[list[Fault], SlipVerdict]:
-    """Return lengths that only points show to be wrong, and whether these explain the points."""
+    """Return lengths that only the points contradict, and whether these explain the points."""
     joint, faults = fit_without_faults(geometry, seen, slack_N)
     known = {(one.kind, one.cable, one.pose) for one in before}
     readings = [
@@ -186,7 +186,7 @@ def without_points(seen: Observations, faults: Iterable[Fault]) -> Observations:
 
 
 def _left_out(geometry: CableGeometry, found: Fit, tried: list[Fault]) -> tuple[Fault, Fit]:
-    """Return the tried fault without which the fit leaves least, and that fit.
+    """Return the fault whose removal reduces the residuals most, and the fit without it.
 
     Poses can absorb much of a jump. A pose that few readings determine can absorb much of a wrong
     length or point. Only fitting the poses again shows which fault it is.
@@ -230,7 +230,7 @@ def _only_without(
 
 
 def _is_off(fault: Fault, found: Fit) -> bool:
-    """Return whether a jump still has a size: a jump found later may explain it entirely."""
+    """Return whether a jump is still significant: one that was found later may explain it."""
     k = found.seen.jumps.index((fault.cable, fault.pose))
     variance = found.covariance[found.geometry.size + k, found.geometry.size + k]
     return bool(found.jumps_m[k] ** 2 > _FAR**2 * variance)
@@ -271,7 +271,7 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
 
 
 def _worst(found: Fit) -> list[Fault]:
-    """Return the readings that may be the worst contradiction, or an empty list."""
+    """Return the candidates for the reading that contradicts the others most, or an empty list."""
     n, seen = found.geometry.n, found.seen
     residual, hat, weight = _hats(found)
     redundancy = 1.0 - np.array([np.diag(h) for h in hat]).T
@@ -312,9 +312,10 @@ def _worst(found: Fit) -> list[Fault]:
 
 
 def _point_gains(found: Fit) -> FloatArray:
-    """Return the reduction of the sum of squares by leaving out each measured point, (N,).
+    """Return the reduction of the sum of squares if each measured point is left out, (N,).
 
-    Two per coordinate except the first are subtracted, to compare with leaving out one length.
+    For each coordinate except the first, 2 is subtracted, so that the values can be compared with
+    those of a single length.
     """
     at, rows = found.at, found.at.points
     by_pose = at.by_pose[:, rows] * np.sqrt(found.weights[:, rows])[..., None]
@@ -329,7 +330,7 @@ def _point_gains(found: Fit) -> FloatArray:
 
 
 def _alike(gains: FloatArray, best: int, share: float = _ALIKE) -> tuple[int, ...]:
-    """Return the cables that fit nearly as well as the best one."""
+    """Return the cables that explain the residuals nearly as well as the best one."""
     near = np.flatnonzero(gains > share * gains[best])
     return tuple(int(cable) for cable in near if cable != best)
 
@@ -337,8 +338,8 @@ def _alike(gains: FloatArray, best: int, share: float = _ALIKE) -> tuple[int, ..
 def _hats(found: Fit) -> tuple[FloatArray, list[FloatArray], FloatArray]:
     """Return residuals (N, n), the hat matrix of each cable's residuals, and weights.
 
-    For rows j, k of one cable it is p_j Σ p_k^T + δ_jk x_j C_j^-1 x_j^T; p are the derivatives by
-    the parameters less what the poses take of them.
+    For rows j, k of one cable the hat matrix is p_j Σ p_k^T + δ_jk x_j C_j^-1 x_j^T. Here p are the
+    derivatives by the parameters, reduced by the elimination of the poses.
     """
     n, at = found.geometry.n, found.at
     by_pose = at.by_pose[:, :n] * np.sqrt(found.weights[:, :n])[..., None]
@@ -350,7 +351,7 @@ def _hats(found: Fit) -> tuple[FloatArray, list[FloatArray], FloatArray]:
 
 
 def _jump_gains(residual: FloatArray, hat: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the reduction of the sum of squares by an offset from each pose on, (N,)."""
+    """Return the reduction of the sum of squares by an offset that begins at each pose, (N,)."""
     count = residual.size
     left = (np.eye(count) - hat) * np.outer(weight, weight)
     both = np.cumsum(np.cumsum(left[::-1, ::-1], axis=0), axis=1)[::-1, ::-1]
@@ -362,7 +363,7 @@ def _jump_gains(residual: FloatArray, hat: FloatArray, weight: FloatArray) -> Fl
 
 
 def parameter_faults(found: Fit) -> list[Fault]:
-    """Return parameters that differ from the file by more than tape, drum or cable may."""
+    """Return parameters whose change exceeds the tolerance of tape, drum or cable."""
     geometry, known = found.geometry, found.geometry.knowledge
     faults = []
     if "drum" in geometry.identified:
@@ -389,17 +390,19 @@ def parameter_faults(found: Fit) -> list[Fault]:
 # Faults of images and markers, and which readings are right if camera and cables disagree.
 
 UNDECIDED = "undecided: "
-"""Start of the text for a contradiction that no reading resolves."""
+"""Start of the text about a contradiction that the readings cannot resolve."""
 _OFF = 3.0
-"""Standard deviations of sizes, drums or lens beyond which causes are looked for."""
+"""Deviation of sizes, drums or lens, in standard deviations, above which the cause is searched
+for."""
 _LOOSE_SIZE, _LOOSE_DRUM, _LOOSE_FOCAL = 0.1, 0.05, 0.05
 _LOOSE_LENS = (20.0, 20.0, 0.1, 0.1, 0.005, 0.005, 0.1)
-"""Standard deviations of lens figures that are set free: in px, then k1, k2, p1, p2, k3."""
+"""Standard deviations of lens parameters that are set free: fx, fy, cx, cy in px, then k1, k2, p1,
+p2, k3."""
 _COUNTS: Final[dict[FaultKind, int]] = {"size": 1, "drum": 0, "lens": 9}
-"""Causes, and how many numbers each sets free; 0 stands for one number per cable."""
+"""Causes, and the number of parameters that each sets free; 0 means one per cable."""
 _CHANCE, _CHANCE_BESIDE_LENS = 1e-3, 1e-5
-"""Probability of rejecting a correct hand-eye. It is lower beside a wrong lens, because the lens
-then explains most of the camera's displacement."""
+"""Probability of rejecting a correct hand-eye transform. It is lower if the lens is also wrong,
+because the lens then explains most of the camera's displacement."""
 _AT_ONCE = 3
 """Least number of jumps at the same pose that a moved camera may explain."""
 _SURE = 9.0
@@ -418,11 +421,12 @@ def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
 
 
 def hand_eye_fault(found: Fit, told: CameraKnowledge, others: Sequence[Fault] = ()) -> Fault | None:
-    """Return a fault if the camera does not sit where the hand-eye file says, else None.
+    """Return a fault if the camera's pose contradicts the hand-eye file, else None.
 
-    `found` is a fit without that file, `others` are other faults of given figures. The difference
-    d from the given place has the covariance P + C, of the given place and of the fit. A place is
-    wrong if such a large coordinate, or d^T (P + C)^-1 d, is improbable.
+    `found` is a fit without that file, `others` are other faults of given values. The difference d
+    from the given pose has the covariance P + C, the sum of the covariances of the given pose and
+    of the fit. The given pose is wrong if the largest coordinate of d, or d^T (P + C)^-1 d, is
+    improbably large.
     """
     camera = found.camera
     assert camera is not None
@@ -448,16 +452,16 @@ def hand_eye_fault(found: Fit, told: CameraKnowledge, others: Sequence[Fault] = 
 
 
 def place_faults(start: CameraStart) -> list[Fault]:
-    """Return the faults of the known places of markers."""
+    """Return the faults of the known marker poses."""
     before = UNDECIDED if start.contradictory_places else ""
     return [Fault("place", -1, -1, 0.0, before + text) for text in start.place_faults]
 
 
 def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
-    """Return a fault for each pose from which on several cables are off.
+    """Return a fault for each pose at which offsets of several cables begin.
 
-    Several cables seldom slip together. A camera that moved on its platform looks the same: its
-    later poses contradict the lengths, and offsets of some cables explain most of it.
+    Several cables seldom slip together. A camera that has moved on its platform has the same
+    effect: its later poses contradict the lengths, and offsets of some cables explain most of that.
     """
     at = Counter(fault.pose for fault in faults if fault.kind == "jump")
     return [
@@ -472,12 +476,12 @@ def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
 
 
 def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit, list[Fault]]:
-    """Return the fit with wrong figures set free, and their faults: sheets, drums or the lens.
+    """Return the fit with wrong given values of sheets, drums or lens set free, and their faults.
 
-    If one of these figures is far from its given value, cables and camera contradict each other.
-    Each is set free in turn while the others keep their given values, then each pair. The best fit
-    is the explanation; exit points by tape, known places of markers and measured points count in
-    it. If two explanations fit equally well, the cause remains unknown and the fit unchanged.
+    If one of these values is wrong, cables and camera contradict each other. Each is set free in
+    turn while the others keep their given values, then each pair. The best fit is the explanation.
+    It also takes into account exit points measured by tape, known marker poses and measured points.
+    If two explanations fit equally well, the cause remains unknown and the fit is unchanged.
     """
     camera = found.camera
     assert camera is not None
@@ -487,7 +491,7 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
     alone = {one.kinds[0]: one.score for one in tried}
     for pair in combinations(_COUNTS, 2):
         both = _tried(geometry, found, pair)
-        # otherwise one figure of the pair explains it equally well
+        # otherwise one value of the pair alone explains it equally well
         if both.score <= min(alone[kind] for kind in pair) - _SURE:
             tried.append(both)
     tried.sort(key=lambda one: one.score)
@@ -506,7 +510,7 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
 
 @dataclass(frozen=True)
 class _Cause:
-    """Explanation by wrong figures of the file: `count` numbers and the fit with these free."""
+    """Explanation by wrong given values: their `count`, and the fit with these values free."""
 
     kinds: tuple[FaultKind, ...]
     count: int
@@ -514,12 +518,12 @@ class _Cause:
 
     @property
     def score(self) -> float:
-        """The sum of squares, and two for each free number (Akaike)."""
+        """The sum of squares plus 2 for each free parameter (Akaike)."""
         return self.fit.total_cost + 2 * self.count
 
 
 def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) -> _Cause:
-    """Return an explanation: the fit with these figures set free."""
+    """Return an explanation: the fit with these values set free."""
     camera = found.camera
     assert camera is not None
     seen = replace(found.seen, start=found.poses)
@@ -537,7 +541,7 @@ def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) ->
 
 
 def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
-    """Return the fit by the only explanation, and faults for the wrong figures."""
+    """Return the fit of the only explanation, and the faults of the wrong values."""
     why = "; this agrees best with exit points and measurements, so it is used"
     found, faults = best.fit, []
     for kind in best.kinds:
@@ -551,7 +555,7 @@ def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
 
 
 def _contradiction(geometry: CableGeometry, found: Fit, first: MapFit) -> bool:
-    """Return whether a given figure of sheets, drums or lens is far off."""
+    """Return whether a given value of sheets, drums or lens is far from the fitted one."""
     camera = found.camera
     assert camera is not None
     free, known = camera.free_lens, camera.knowledge
@@ -570,7 +574,7 @@ def _all_drums(geometry: CableGeometry, found: Fit) -> bool:
 
 
 def _cause(kind: FaultKind, found: Fit) -> tuple[float, str]:
-    """Return the relative size of a cause, and its text."""
+    """Return the relative size of a cause, and the cause as text."""
     camera = found.camera
     assert camera is not None
     if kind == "size":

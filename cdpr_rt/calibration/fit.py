@@ -30,7 +30,7 @@ from cdpr_rt.model.cable_kernel import CABLE_ROWS, run_poses
 from cdpr_rt.model.rigid_body import G_m_s2
 
 _UNIT = 0.05
-"""Change of a parameter, m and rad, that counts as large whatever its prior."""
+"""Change of a parameter, m and rad, that counts as large for every prior."""
 
 
 class NormalEquations:
@@ -45,16 +45,16 @@ class NormalEquations:
         free: tuple[int, ...],
         taken_out: FloatArray,
     ) -> None:
-        """Take rows of poses, whose parameters come first, and corners; (P,) parameters in all.
+        """Take rows of poses, whose parameters come first, and corners, with P parameters in total.
 
-        `taken_out` (P,) is spurious information about single parameters, which is subtracted.
+        `taken_out` (P,) is the spurious information about single parameters, to be subtracted.
         """
         size, first = known_std.size, at.by_parameter.shape[2]
         self._scale = known_std
         scaled = at.by_parameter * known_std[:first]
         turned, across = np.swapaxes(scaled, 1, 2), np.swapaxes(at.by_pose, 1, 2)
-        # products of one pose are so small that BLAS starts no threads, whose cost would exceed the
-        # gain
+        # products per pose are so small that BLAS starts no threads; threads would cost more than
+        # they gain
         H, E = np.eye(size), np.zeros((len(at.by_pose), size, len(free)))
         gradient, C = prior.copy(), across @ at.by_pose
         by_pose = (across @ at.residual[..., None])[..., 0]
@@ -74,7 +74,8 @@ class NormalEquations:
     def solve(self, damping: float) -> tuple[FloatArray, FloatArray, float]:
         """Return changes of parameters (P,), of poses (N, d), and their size.
 
-        The size is relative to a parameter's prior deviation, or to 5 cm and rad if that is less.
+        The size of a parameter's change is relative to its prior deviation, or to 0.05 m and rad if
+        that is less.
         """
         y, moves = self._blocks.step(damping)
         spread = np.sqrt(np.einsum("jd,jde,je->j", moves, self._blocks.C, moves))
@@ -94,9 +95,9 @@ class NormalEquations:
         return np.asarray(both * np.outer(self._scale, self._scale)), told
 
     def left_of(self, at: Linearised) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return derivatives of rows by the parameters less what poses take of them, (N, R, P).
+        """Return derivatives of rows by the parameters after elimination of the poses, (N, R, P).
 
-        Also return J_x C^-1, (N, R, d), and C^-1, (N, d, d).
+        Also returns J_x C^-1, (N, R, d), and C^-1, (N, d, d).
         """
         inverse = self._blocks.pose_covariance()
         taken = at.by_pose @ inverse
@@ -106,21 +107,22 @@ class NormalEquations:
 
 
 # Effect of noisy tensions on a fit: they correlate the lengths of a pose, and bias the elongation.
-# A length that yields by l c (1 + κ) t errs with the tension by (1 + κ) A e, A = l c / σ. So does
-# its derivative by κ, A t, which is used as A (t + e). Of the information I about κ, the share n
-# = Σ_j tr((1 - H_j) S_j) is spurious, S_j = A_j Cov(e_j) A_j with the hat H of all unknowns. If
-# true tensions scatter about given ones, such as a controller's set-points, 1 + κ is unbiased
-# (Berkson); if given ones scatter about true ones, it is (1 + κ) (I - n) / I (Fuller, Measurement
-# Error Models, 1.1). Which case applies is unknown. Both are weighed by how well their elongation
-# agrees with the file, and the mean is taken, by -q (1 + κ)² in the cost, which takes q out of
-# I. The standard deviation of the two cases is predicted in addition to noise.
+# A cable stretches by l c (1 + κ) t, so an error e of the tension causes the error (1 + κ) A e of
+# the weighted length, A = l c / σ. The derivative by κ is A t, for which the fit uses A (t + e). So
+# the part n = Σ_j tr((1 - H_j) S_j) of the information I about κ is spurious, with S_j = A_j
+# Cov(e_j) A_j and the hat matrix H of all unknowns. If true tensions scatter about given ones, such
+# as a controller's set-points, 1 + κ is unbiased (Berkson). If given tensions scatter about true
+# ones, the fit finds (1 + κ) (I - n) / I (Fuller, Measurement Error Models, 1.1). It is unknown
+# which case applies. Both are weighted by how well their elongation agrees with the file. The term
+# -q (1 + κ)² in the cost, which subtracts q from I, makes the fit find the weighted mean. The
+# standard deviation of the two cases is predicted in addition to noise.
 
 _MOST_SHARE = 0.9
-"""Largest share of the information about the elongation that counts as noise."""
+"""Largest share of the information about the elongation that is subtracted as spurious."""
 
 
 def slope_covariance(geometry: CableGeometry, seen: Observations) -> FloatArray:
-    """Return S, the effect of tension errors on lengths over their deviations, (N, n, n)."""
+    """Return S (N, n, n), the covariance of weighted lengths due to errors of the tensions."""
     soft = geometry.knowledge.tension_N * seen.length_m * geometry.compliance_1_N
     A = seen.used * soft / length_std_m(geometry, seen)
     free = np.eye(geometry.n) if seen.tension_free is None else seen.tension_free
@@ -128,29 +130,29 @@ def slope_covariance(geometry: CableGeometry, seen: Observations) -> FloatArray:
 
 
 def correlated(left: FloatArray, noise: FloatArray, yielding: float) -> FloatArray:
-    """Return what rows with correlated errors add to the variance of the gradient, (P, P).
+    """Return the variance of the gradient due to correlated errors of rows, (P, P).
 
-    `left` (N, n, P) are derivatives by the parameters less what poses take of them, `noise` is S.
+    `left` (N, n, P) are derivatives by the parameters after elimination of the poses; `noise` is S.
     """
     across = noise * (1.0 - np.eye(noise.shape[1]))
     return np.asarray(yielding**2 * np.einsum("jap,jab,jbq->pq", left, across, left, optimize=True))
 
 
 def feigned(hats: FloatArray, noise: FloatArray, information: float) -> float:
-    """Return n for hats (N, n, n) of lengths, `noise` S and the information I about κ."""
+    """Return the spurious information n, for hats (N, n, n) of lengths and `noise` S."""
     spare = np.eye(noise.shape[1]) - hats
     told = float((spare * noise).sum())
     return most_taken_out(max(told, 0.0), information)
 
 
 def most_taken_out(wanted: float, information: float) -> float:
-    """Return what is taken out of the information I about κ, so that enough is left."""
+    """Return how much may be subtracted from the information I about κ, so that enough is left."""
     return min(wanted, _MOST_SHARE * information)
 
 
 @dataclass(frozen=True)
 class Elongations:
-    """Elongations for true tensions that scatter about given ones, and for the opposite case."""
+    """Elongations if true tensions scatter about given ones, and for the opposite case."""
 
     by_set: float
     """1 + κ in the first case; `by_true` is that of the second."""
@@ -158,7 +160,7 @@ class Elongations:
     share: float
     """Probability of the second case, by the prior of κ."""
     taken_out: float
-    """q for which the fit has the mean of both."""
+    """q for which the fit finds the weighted mean of both."""
 
     def off(self, elongation: float) -> float:
         """Return the root mean square error of κ."""
@@ -169,7 +171,7 @@ class Elongations:
 def elongations(
     elongation: float, known_std: float, told: float, information: float, taken_out: float
 ) -> Elongations:
-    """Return both cases for κ as found with q `taken_out`, for n and I."""
+    """Return both cases, if a fit with q `taken_out` has found κ; `told` is n, `information` I."""
     by_set = (1.0 + elongation) * (information - taken_out) / information
     by_true = by_set * information / (information - told)
     less_likely = ((by_true - 1.0) ** 2 - (by_set - 1.0) ** 2) / (2.0 * known_std**2)
@@ -179,7 +181,7 @@ def elongations(
 
 
 def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
-    """Return the covariance (P, P) after taking this information about parameter k out."""
+    """Return the covariance (P, P) after subtracting this information about parameter k."""
     own = covariance[:, k]
     return np.asarray(
         covariance + np.outer(own, own) * (taken_out / (1.0 - taken_out * covariance[k, k]))
@@ -188,10 +190,11 @@ def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
 
 _MOST_STEPS = 60
 _DONE = 1e-4
-"""Largest step over a parameter's standard deviation at which the search ends."""
+"""The search ends if the largest step, over the parameter's standard deviation, is less."""
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-13, 1e8
 _HUBER = 2.5
-"""Standard deviations beyond which a length or a measured point counts less (Huber's loss)."""
+"""Residual, in standard deviations, above which a length or measured point gets less weight
+(Huber's loss)."""
 JUMP_STD_m = 1.0
 """Prior standard deviation of the size of a jump."""
 _NO_MORE = 1e-12
@@ -200,7 +203,7 @@ _NO_MORE = 1e-12
 
 @dataclass(frozen=True)
 class Fit:
-    """An identified geometry with the poses that go with it, and how certain both are."""
+    """An identified geometry with the poses that belong to it, and the uncertainty of both."""
 
     geometry: CableGeometry
     jumps_m: FloatArray
@@ -209,42 +212,43 @@ class Fit:
     """(N, 4, 3)"""
     seen: Observations
     covariance: FloatArray
-    """Of the parameters of geometry, jumps and camera, (P, P), with priors; by noise alone."""
+    """Covariance of the parameters of geometry, jumps and camera, (P, P), with priors, due to noise
+    alone."""
     attenuation: FloatArray
-    """Standard deviation of parameters because the tensions err, (P,): common to all parameters,
-    and not reduced by further poses."""
+    """Standard deviation of parameters due to errors of the tensions, (P,): it is common to all
+    parameters, and further poses do not reduce it."""
     slope_noise: float
     """Value of `Knowledge.slope_noise` with which a further fit reaches the elongation of
     `elongations`."""
     at: Linearised
     """Residuals and derivatives of geometry and jumps at the result, without the robust loss."""
     weights: FloatArray
-    """Weights of the robust loss, (N, R), 1 and below: of lengths and of measured points."""
+    """Weights (N, R) of the robust loss for lengths and measured points, at most 1."""
     left: FloatArray
-    """Weighted derivatives of rows by all parameters less what poses take of them, (N, R, P)."""
+    """Weighted derivatives of rows by all parameters after elimination of the poses, (N, R, P)."""
     taken: FloatArray
     """Weighted derivatives of rows by the pose, times `pose_covariance`, (N, R, d)."""
     pose_covariance: FloatArray
-    """C^-1, (N, d, d), of poses if the parameters are known."""
+    """Covariance C^-1 of poses for known parameters, (N, d, d)."""
     variance_factor: float
     """Sum of squared residuals of lengths and measured poses over their degrees of freedom: 1 if
     the standard deviations are right."""
     corner_factor: float
-    """Variance factor of corners of markers, by the median of their distances; else 1."""
+    """Variance factor of marker corners, from the median of their distances; 1 without markers."""
     total_cost: float
-    """Of all observations and priors, as weighted by the losses."""
+    """Cost of all observations and priors, as weighted by the losses."""
     steps: int
     converged: bool
     camera: CameraModel | None = None
 
     @property
     def inflation(self) -> float:
-        """Factor of the covariance over the one from standard deviations alone."""
+        """Ratio of the covariance to the one that the assumed standard deviations give."""
         return max(self.variance_factor, self.corner_factor, 1.0)
 
     @property
     def uncertainty(self) -> FloatArray:
-        """Covariance by noise and by attenuation, (P, P)."""
+        """Covariance due to noise and to errors of the tensions, (P, P)."""
         return np.asarray(self.covariance + np.outer(self.attenuation, self.attenuation))
 
     @property
@@ -273,13 +277,14 @@ def fit(
 ) -> Fit:
     """Return the geometry and poses that minimise the squared residuals of all observations.
 
-    Levenberg and Marquardt. Prior knowledge of parameters counts as an observation, so that there
-    is always one minimum, and parameters that no observation determines stay as in the file. That
-    fixes the gauge: without measured poses or known markers the frame is that in which the exit
-    points, taken together, are moved least. `robust` applies Huber's loss to lengths and to
-    distances from measured points and rotations, and Cauchy's to corners. `start` is the first
-    geometry, by default `geometry`. With `camera`, which also is the start of its parameters, these
-    are fitted too and seen markers count. Raises InvalidRequestError for no poses.
+    The method is that of Levenberg and Marquardt. Prior knowledge of parameters counts as an
+    observation. So there is always one minimum, and parameters that no observation determines stay
+    as in the file. The prior also fixes the gauge: without measured poses or known markers, the
+    frame is the one in which the exit points as a whole move least. `robust` applies Huber's loss
+    to lengths and to distances from measured points and rotations, and Cauchy's to corners. `start`
+    is the first geometry, by default `geometry`. With `camera`, its parameters are fitted too,
+    starting from the given ones, and seen markers are used. Raises InvalidRequestError if there are
+    no poses.
     """
     if seen.poses == 0:
         raise InvalidRequestError("no poses; allowed: at least one")
@@ -326,7 +331,7 @@ class _Search:
         self._known = np.concatenate(known)
         self._taken_out = 0.0
         self._fixed: tuple[FloatArray, FloatArray] | None = None
-        """Weights of rows and corners after they have been frozen."""
+        """Frozen weights of rows and corners; None before they are frozen."""
         self._damping = _DAMPING
         self._done, self._converged = False, True
         start = replace(start, knowledge=geometry.knowledge)
@@ -393,7 +398,7 @@ class _Search:
         )
 
     def _normal(self, at: Linearised, slope_noise: float) -> NormalEquations:
-        """Return the normal equations, less `slope_noise` of information about the elongation."""
+        """Return the normal equations, with the information about κ reduced by `slope_noise`."""
         here, seen, corners = self._here, self._markers, None
         prior, taken_out = here.prior.copy(), np.zeros_like(self._known)
         if slope_noise:
@@ -416,7 +421,7 @@ class _Search:
         return cauchy_weights(here.off_px, here.camera.knowledge.noise_px)
 
     def settle(self) -> int:
-        """Step until steps are small; return the number of steps."""
+        """Make steps until they are small; return the number of steps."""
         steps, self._done, self._damping = 0, False, _DAMPING
         while steps < _MOST_STEPS and not self._done:
             self.step()
@@ -425,10 +430,10 @@ class _Search:
         return steps
 
     def take_out(self) -> None:
-        """Take noise of tensions out of the information about the elongation.
+        """Subtract the spurious information about the elongation, due to noise of tensions.
 
-        An earlier fit has estimated the noise, and there may be less information here. Weights are
-        frozen from here on: decreasing weights would leave less and less information.
+        An earlier fit has estimated it; this fit may have less information. Weights are frozen from
+        here on, because decreasing weights would leave less and less information.
         """
         here, k = self._here, self._here.geometry.size - 1
         information = 1.0 / float(self._normal(self._weighted(), 0.0).covariance()[0][k, k])
@@ -438,7 +443,7 @@ class _Search:
         self._here = self._state(here.geometry, here.jumps, here.camera, here.poses)
 
     def step(self) -> None:
-        """Go one step, and shorten it until the cost does not increase."""
+        """Make one step, and shorten it until the cost does not increase."""
         normal, here = self._normal(self._weighted(), self._taken_out), self._here
         size_g, size_j = here.geometry.size, here.jumps.size
         most = here.cost + _NO_MORE * abs(here.cost)
@@ -471,7 +476,7 @@ class _Search:
         hats = left @ covariance @ np.swapaxes(left, 1, 2)
         hats += taken @ np.swapaxes(weighted.by_pose, 1, 2)
         counts = (weighted.by_pose != 0.0).any(axis=2)
-        counts[:, -3:] &= np.isfinite(self._seen.rotation_std_rad)  # a target is no reading
+        counts[:, -3:] &= np.isfinite(self._seen.rotation_std_rad)  # a target is not a reading
         rows = int(counts.sum())
         corner_factor = 1.0
         if here.camera is not None and self._markers is not None:
@@ -495,7 +500,7 @@ class _Search:
     def _with_noise_of_tensions(
         self, covariance: FloatArray, left: FloatArray, hats: FloatArray
     ) -> tuple[FloatArray, FloatArray, float]:
-        """Return the covariance with that noise, attenuation and slope noise as in `Fit`.
+        """Return covariance, attenuation and slope noise as in `Fit`, with the noise of tensions.
 
         `left` (N, n, P) and `hats` (N, n, n) belong to the rows of lengths.
         """
@@ -538,13 +543,13 @@ def moved(poses: FloatArray, moves: FloatArray, free: tuple[int, ...]) -> FloatA
 
 
 def locate(geometry: CableGeometry, seen: Observations) -> Fit:
-    """Return the poses determined by lengths alone, with the geometry held fixed."""
-    known = replace(geometry.knowledge, alike=1.0)  # each pose by its own reading
+    """Return the poses that lengths alone determine, with a fixed geometry."""
+    known = replace(geometry.knowledge, alike=1.0)  # each pose is determined by its own reading
     still = replace(geometry, identified=(), knowledge=known)
     return fit(still, seen.unmeasured(), robust=False)
 
 
-# Standard deviations of lengths and tensions from residuals, because neither is known before.
+# Standard deviations of lengths and tensions, estimated from residuals because they are unknown.
 # Tensions t hold the platform: W t + w = 0, with the wrench matrix W and the weight's wrench w,
 # which is linear in the mass m and in m c. With W = U S V^T the d numbers S^-1 U^T (W t + w) of a
 # pose have the standard deviation of a tension.
@@ -555,21 +560,22 @@ _WEAK, _INERT = 1e-3, 1e-9
 _ROUNDS = 3
 _BELIEVED = 1.5
 _HELD = 3.0
-"""Multiple of the median beyond which another force must hold the platform at a pose."""
+"""If a pose's residual is above this multiple of the median, another force must act on the
+platform."""
 _LEAST_SHARE = 0.2
 """Least standard deviation of a length that the fit may find, relative to the prior one."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Tensions as the balance of the platform's forces corrects them."""
+    """Tensions corrected by the equilibrium of the platform."""
 
     tension_N: FloatArray
     """(N, n)"""
     free: FloatArray
-    """Projections onto the noise that the correction leaves, (N, n, n)."""
+    """Projections (N, n, n) onto the noise that remains after the correction."""
     std_N: float | None
-    """Standard deviation of a tension before the correction; None if too few rows remain."""
+    """Standard deviation of a tension before the correction; None if there are too few rows."""
 
     def of(self, seen: Observations) -> Observations:
         """Return observations with these tensions."""
@@ -577,11 +583,11 @@ class Balance:
 
 
 def balance(found: Fit, seen: Observations) -> Balance:
-    """Return tensions that hold the platform at the poses of a fit, the nearest to those of `seen`.
+    """Return the tensions nearest to those of `seen` that hold the platform at the poses of a fit.
 
-    Mass and centre of mass are found too. Errors that are common to all cables go unnoticed. Poses
-    at which a length is left out are not corrected, nor those at which the platform does not hang
-    free, for example on its stand.
+    Mass and centre of mass are found too. Errors that are common to all cables cannot be detected.
+    Tensions are not corrected at poses at which a length is left out, or at which the platform does
+    not hang freely, for example on its stand.
     """
     there = np.flatnonzero(found.seen.used.all(axis=1))
     balanced, off_N = _balance_of(found, seen, there)
@@ -591,7 +597,8 @@ def balance(found: Fit, seen: Observations) -> Balance:
     if not held.any():
         return balanced
     free, _ = _balance_of(found, seen, there[~held])
-    # too few poses hang free to correct tensions, but all poses together give their deviation
+    # the platform hangs freely at too few poses to correct tensions, but all poses together give
+    # the standard deviation
     return replace(free, std_N=balanced.std_N) if free.std_N is None else free
 
 
@@ -632,10 +639,10 @@ def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balanc
 def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> CableGeometry:
     """Return the robot's file with the accuracy of readings that a fit has found.
 
-    The assumed uncertainty of encoders and torques is a guess for all robots. The balance of forces
-    gives that of tensions, `told_N`; the residuals of lengths limit it. If a camera determines the
-    poses, the residuals of lengths also give their uncertainty, so that lengths and corners are
-    weighed correctly. It is only ever reduced.
+    The assumed uncertainty of encoders and torques is a guess for all robots. The equilibrium gives
+    the uncertainty of tensions, `told_N`, with a limit by the residuals of lengths. If a camera
+    determines the poses, the residuals of lengths also give the uncertainty of lengths, so that
+    lengths and corners are weighted correctly. Uncertainties are only reduced, never increased.
     """
     geometry, guess = found.geometry, file.knowledge
     known, yielding = geometry.knowledge, max(1.0 + geometry.elongation, 0.0)
@@ -660,8 +667,8 @@ def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> Ca
 def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeometry]:
     """Return a fit with the accuracy of readings that it finds, and the file with that accuracy.
 
-    From the second round on the elongation is the mean of two cases: true tensions scatter about
-    given ones, or given ones about true ones.
+    From the second round on, the elongation is the mean of two cases: true tensions scatter about
+    the given ones, or given tensions scatter about the true ones.
     """
     told, slope_noise = found.seen, 0.0
     weighed = file
@@ -677,8 +684,8 @@ def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeom
 def weighed_fit(found: Fit, weighed: CableGeometry, told: Observations) -> Fit:
     """Return another fit, with balanced tensions of `told` and the weights of `weighed`.
 
-    If the lengths contradict such large errors of tensions as the balance finds, another force
-    holds the platform, and the tensions are not corrected.
+    If the balance finds errors of the tensions that are so large that the lengths contradict them,
+    another force acts on the platform, and the tensions are not corrected.
     """
     return _weighed_fit(found, weighed, told, balance(found, told))
 

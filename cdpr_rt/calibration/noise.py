@@ -1,13 +1,14 @@
-"""Noise of readings by the data themselves, estimated before any reading is called a fault.
+"""Noise of readings, estimated from the data before the search for faults.
 
-The residuals of a fit, over the root of their redundancy, have the standard deviations that the fit
-assumed if these are right. Their robust scale (median) corrects the assumption, and the fit is
-repeated. Lengths, positions and rotations have one scale each.
+If the assumed standard deviations are right, the residuals of a fit, divided by the root of their
+redundancy, have these standard deviations. Their robust scale (median) corrects the assumption, and
+the fit is repeated. Lengths, positions and rotations have one scale each.
 
-While the platform moves, errors of successive readings are alike: wrong parts of the model act at
-neighbouring places. With the autocorrelation ρ_k of residuals, 1 + 2 Σ ρ_k readings count as one.
-Lengths and measured points may also have different clocks. For an offset τ of the points, lengths
-l(t + τ) are used; τ comes from the residuals r and the rates J of lengths (Gauss and Newton).
+While the platform moves, errors of successive readings are correlated, because errors of the model
+are similar at neighbouring positions. With the autocorrelation ρ_k of residuals, 1 + 2 Σ ρ_k
+readings count as one. Lengths and measured points may also have different clocks. If the points are
+late by τ, the fit uses lengths l(t + τ). τ is found from the residuals r and the rates J of lengths
+(Gauss-Newton).
 """
 
 from __future__ import annotations
@@ -31,45 +32,47 @@ MOST_READINGS = 250
 _ROUNDS = 6
 _NORMAL_MEDIAN = 0.6745
 _TOLD = 0.1
-"""Least redundancy of a residual that counts in a scale."""
+"""Least redundancy of a residual that is used for a scale."""
 _LEAST_TOLD = 20
 """Least number of residuals for a scale."""
 _LARGER, _SAME = 1.3, 1.1
-"""Scale above which noise of a platform at rest is larger than assumed; scale that is no change."""
+"""Scale above which the noise of a platform at rest is larger than assumed; scale below which a
+change is negligible."""
 _LEAST_RHO, _WINDOW = 0.05, 20
 _GAP = 2.5
-"""Time between readings over the median, from which on they are separate."""
+"""A gap between readings is longer than this multiple of the median interval."""
 _GLITCH, _BESIDE, _LEAST_m, _LEAST_rad = 6.0, 9, 0.003, 0.02
-"""A point that jumps by more standard deviations, and by more, is a glitch; neighbours in time."""
+"""A point is a glitch if it jumps by more than this many standard deviations and by more than the
+least distance or angle; number of neighbours in time to compare with."""
 _OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
 _LOOSE_DRUM, _FAR = 0.1, 3.0
-"""Standard deviation of drums at first; multiple of the assumed one beyond which they are wrong."""
+"""Initial standard deviation of drums; multiple of the assumed one above which drums are wrong."""
 _AIM_SHARE, _COPY_SHARE = 0.25, 0.1
-"""Standard deviation of the platform's rotation about its target, over the largest target; share of
-that below which targets are copies of measured rotations."""
+"""Standard deviation of the platform's rotation about its target, as a share of the largest target;
+share of this standard deviation below which targets are copies of measured rotations."""
 
 WithoutFaults = Callable[[CableGeometry, Observations], tuple[Fit, int]]
-"""Returns a fit without faulty readings, and their number."""
+"""Function that returns a fit without faulty readings, and the number of these."""
 
 
 @dataclass(frozen=True)
 class NoiseSeen:
-    """Readings as the fit uses them, and the noise that they have."""
+    """Readings as the fit uses them, and their estimated noise."""
 
     geometry: CableGeometry
-    """With the standard deviation of lengths by the data."""
+    """Geometry, with the standard deviation of lengths estimated from the data."""
     seen: Observations
-    """With the standard deviations of points by the data, without time offset."""
+    """Readings without time offset, with standard deviations of points estimated from the data."""
     assumed_length_m: float
     offset_s: float = 0.0
-    """Time by which points are later than the lengths of the same reading."""
+    """Delay of points relative to the lengths of the same reading."""
     offset_std_s: float = 0.0
-    """0 if no offset was fitted."""
+    """Standard deviation of the delay; 0 if it was not fitted."""
     glitches: int = 0
     """Number of readings whose measured point or rotation jumps for a moment, and is left out."""
 
     def lines(self) -> list[str]:
-        """Return the noise as text; empty if it is as assumed."""
+        """Return the noise as lines of text; empty if it is as assumed."""
         known, seen, told = self.geometry.knowledge, self.seen, []
         if known.length_m > _SAME * self.assumed_length_m or seen.time_s is not None:
             told.append(
@@ -102,7 +105,7 @@ class NoiseSeen:
         return told
 
     def as_json(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the noise as JSON."""
         known, moving = self.geometry.knowledge, self.seen.time_s is not None
         return {
             "length_std_mm": 1e3 * known.length_m,
@@ -118,11 +121,11 @@ class NoiseSeen:
 def noise_seen(
     geometry: CableGeometry, seen: Observations, without_faults: WithoutFaults
 ) -> NoiseSeen:
-    """Return readings with the noise that they have.
+    """Return readings with their estimated noise.
 
     For a platform at rest, only the noise of lengths is estimated, and it is only increased, if
-    faults of single readings do not explain the residuals. Of very many readings, one in a few is
-    used.
+    faults of single readings do not explain the residuals. If there are very many readings, only
+    every second, third, ... one is used.
     """
     every = -(-seen.poses // MOST_READINGS)
     known, moves = geometry.knowledge, seen.time_s is not None
@@ -159,7 +162,7 @@ def _lengths(geometry: CableGeometry) -> slice:
 
 
 def _scale(found: Fit, rows: slice) -> float:
-    """Return the robust scale of residuals of some rows; 1 for too few."""
+    """Return the robust scale of residuals in some rows; 1 if there are too few."""
     at, information = found.at, found.covariance / found.inflation
     own = (found.taken[:, rows] * at.by_pose[:, rows]).sum(axis=2)
     own *= np.sqrt(found.weights[:, rows])
@@ -172,18 +175,18 @@ def _scale(found: Fit, rows: slice) -> float:
     return math.sqrt(found.geometry.knowledge.alike) * float(np.median(off)) / _NORMAL_MEDIAN
 
 
-# Noise that is larger than assumed, and a platform that moves.
+# Noise that is larger than assumed, and noise while the platform moves.
 
 
 def _by_data(
     geometry: CableGeometry, whole: Observations, every: int, without_faults: WithoutFaults
 ) -> NoiseSeen:
-    """Return one reading in `every` with the noise that residuals show, and without time offset."""
+    """Return one reading in `every`, with the noise by the residuals and without time offset."""
     seen, first = _thinned(whole, every), geometry.knowledge.length_m
     points = seen.position_std_m, seen.rotation_std_rad
     offset_s = offset_std_s = 0.0
     timed = whole.time_s is not None and int(seen.measured.sum()) >= _LEAST_TOLD
-    # wrong drums of the file would look like noise, which would then hold the fit to them
+    # wrong drums in the file would look like noise, and this noise would bind the fit to the file
     geometry = _with_drums(geometry, _LOOSE_DRUM)
     for _ in range(_ROUNDS):
         found = fit(geometry, seen)
@@ -206,15 +209,15 @@ def _by_data(
 
 
 def _without_glitches(geometry: CableGeometry, seen: Observations) -> tuple[Observations, int]:
-    """Return readings without points that jump for moments, and the number of these.
+    """Return readings without points that jump for a moment, and the number of these.
 
-    They are far from the positions by lengths, compared with their neighbours in time. Errors of
-    the geometry are the same at these; a frozen or displaced camera is not a glitch.
+    Such a point is much farther from the position by lengths than its neighbours in time. Errors of
+    the geometry affect the neighbours too. A frozen or displaced camera is not a glitch.
     """
     there = locate(geometry, seen).poses
     off = np.zeros((seen.poses, 6))
     off[:, :3] = there[:, 0] + there[:, 1:] @ seen.target_m - seen.position_m
-    # the rotation by lengths may be uncertain: the measured one is compared with itself
+    # the rotation by lengths may be uncertain, so measured rotations are compared with each other
     off[:, 3:] = Rotation.from_matrix(seen.rotation).as_rotvec()
     known = np.isfinite(np.column_stack([seen.position_std_m, seen.rotation_std_rad]))
     wrong = np.zeros((seen.poses, 2), bool)
@@ -259,19 +262,19 @@ def _rescaled(
     least_m: float,
     points: tuple[FloatArray, FloatArray],
 ) -> tuple[CableGeometry, Observations, bool]:
-    """Return geometry and readings with the noise by the residuals, and whether it is the same.
+    """Return geometry and readings with the noise by the residuals, and whether it is unchanged.
 
-    `least_m` is the least noise of lengths, `points` are the given deviations of positions and
-    rotations, which are reduced only if they are guesses.
+    `least_m` is the least noise of lengths. `points` are the given standard deviations of positions
+    and rotations, which are reduced only if they are guesses.
     """
     geometry, knowledge, at = found.geometry, found.geometry.knowledge, found.at.points
     lengths = 1.0 if knowledge.length_known else _scale(found, _lengths(geometry))
     length_m = max(lengths * knowledge.length_m, least_m)
     positions, turns = _scale(found, at), _scale(found, slice(at.stop, at.stop + 3))
-    # until faults are looked for, each reading counts, so that the file does not hold the fit
+    # before the search for faults every reading is used, so that the file does not bind the fit
     alike = knowledge.alike if knowledge.loose_drum == _LOOSE_DRUM else _alike(found)
     given_m, given_rad = points
-    if seen.time_s is None:  # points by hand are few, and may be wrong together
+    if seen.time_s is None:  # manually measured points are few, and may all be wrong
         positions = turns = 1.0
     position_m, rotation_rad = positions * seen.position_std_m, turns * seen.rotation_std_rad
     if seen.time_s is None or not seen.std_guessed:
@@ -293,9 +296,9 @@ def _rescaled(
 
 
 def _alike(found: Fit) -> float:
-    """Return how many successive readings err alike: 1 + 2 Σ ρ_k for residuals of lengths.
+    """Return the number of successive readings that count as one: 1 + 2 Σ ρ_k, for lengths.
 
-    Readings with a gap between them are independent.
+    Readings on both sides of a gap are independent.
     """
     seen, n = found.seen, found.geometry.n
     off = found.at.residual[:, :n] * np.sqrt(found.weights[:, :n])
@@ -313,7 +316,7 @@ def _alike(found: Fit) -> float:
 
 
 def _pieces(time_s: FloatArray) -> FloatArray:
-    """Return the number of the piece without a gap to which each reading belongs, (N,)."""
+    """Return the index of the gapless piece to which each reading belongs, (N,)."""
     between = np.diff(time_s)
     return np.append(0, np.cumsum(between > _GAP * np.median(between)))
 
@@ -330,7 +333,7 @@ def _rates(seen: Observations) -> FloatArray:
 
 
 def _lengths_at(seen: Observations, offset_s: float) -> FloatArray:
-    """Return lengths (N, n) later by an offset; straight on beyond the ends of a piece."""
+    """Return lengths (N, n) that are later by an offset, extrapolated at the ends of a piece."""
     assert seen.time_s is not None
     out, rate, piece = seen.length_m.copy(), _rates(seen), _pieces(seen.time_s)
     for one in range(int(piece[-1]) + 1):
@@ -346,7 +349,7 @@ def _lengths_at(seen: Observations, offset_s: float) -> FloatArray:
 
 
 def _time_step(found: Fit, whole: Observations, every: int, offset_s: float) -> tuple[float, float]:
-    """Return the change of the time offset that reduces the residuals most, and its deviation."""
+    """Return the change of the time offset that minimises the residuals, and its deviation."""
     now = replace(whole, length_m=_lengths_at(whole, offset_s))
     rows, seen = _lengths(found.geometry), found.seen
     root = np.sqrt(found.weights[:, rows])

@@ -1,4 +1,4 @@
-"""A verified calibration: its verdict as text, in JSON and as a file."""
+"""A verified calibration: its verdict as text and as JSON, and its file."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ from cdpr_rt.calibration.verification import (
 
 CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
-"""1.5 mm for 5 m of frame, 3 sigma."""
+"""Wanted 3 sigma of positions per size of the frame: 1.5 mm for 5 m."""
 _WANTED_deg = 0.15
-"""3 sigma, as for a trial's targets."""
+"""Wanted 3 sigma of orientations, as for the targets of a trial."""
 _MOST_OVER_WANTED = 3.0
 """Ratio of predicted to wanted error above which a calibration is not adopted."""
 _MISFIT = 9.0
 _DISHONEST = 3.0
 """Ratio of actual to predicted errors above which a calibration is not adopted."""
 LEAST_POINTS = 3
-"""Least number of measured poses that determine where the robot is in its room."""
+"""Least number of measured poses that determine the robot's position in its room."""
 _MOST_LEFT_OUT = 0.1
 _MOST_POINTS_LEFT_OUT = 0.25
 
@@ -63,7 +63,7 @@ class CalibrationFiles:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A calibration: the fit, faults, undetermined directions, and errors at other poses."""
+    """A calibration: the fit, faults, undetermined directions, and errors at held-out poses."""
 
     robot: Robot
     found: Fit
@@ -72,47 +72,51 @@ class Outcome:
     open_directions: list[OpenDirection]
     verified: Verification
     before: Verification
-    """Verification of the robot's file, with its lengths at the start."""
+    """Verification of the robot's file, with its initial lengths."""
     verified_left_out: int
-    """Readings left out at those poses, because the cable was slack or next to a slip."""
+    """Number of readings left out at the held-out poses, because the cable was slack or near a
+    slip."""
     predicted: Predicted3Sigma
-    """In the workspace; of positions relative to each other if nothing determines the room's frame.
-    It is increased if errors at unused poses are larger than predicted."""
+    """Predicted accuracy in the workspace; if nothing determines the room's frame, accuracy of
+    positions relative to each other. It is increased if errors at held-out poses are larger than
+    predicted."""
     with_more_3_sigma_mm: float
-    """The same for positions with ten more poses that are as informative as those so far."""
+    """The same for positions, with ten more poses that are as informative as the present ones."""
     absolute: Predicted3Sigma
-    """In the frame, with the uncertainty of the frame included."""
+    """Predicted accuracy in the frame, including the uncertainty of the frame itself."""
     known_room: bool
-    """Whether anything was measured in the room: points, or places of markers."""
+    """Whether anything was measured in the room: points, or poses of markers."""
     shift_m: FloatArray
     """Mean displacement of absolute positions in the workspace, (k,)."""
     unused: Unused
     change: CalibrationChange
-    """Change of the robot's file."""
+    """Change relative to the robot's file."""
     honesty: Honesty
-    """Errors at unused measured points, and predicted ones."""
+    """Errors at held-out measured points, and predicted errors."""
     adopt: bool = False
-    """Whether to adopt it even if its changes are not significant."""
+    """Whether to adopt the calibration even if its changes are not significant."""
     wanted_mm: float | None = None
-    """Largest allowed 3 sigma of positions; None: errors must be less than with the file."""
+    """Largest allowed 3 sigma of positions; None means that errors must be less than with the
+    file."""
     verifying_points_left_out: int = 0
-    """Measured points at poses for verification that contradict all other readings."""
+    """Number of measured points at poses for verification that contradict all other readings."""
     noise: NoiseSeen | None = None
-    """Noise of readings by the data; None with images."""
+    """Noise estimated from the data; None with images."""
     cover: Coverage | None = None
-    """Connection of the images; None without images."""
+    """Connection of the images by common markers; None without images."""
 
     @property
     def predicted_3_sigma_mm(self) -> float:
-        """3 sigma of positions, predicted."""
+        """Predicted 3 sigma of positions."""
         return self.predicted.position_mm
 
     @property
     def told_from_file(self) -> bool:
-        """Whether the readings show a difference from the robot's file.
+        """Whether the readings show a significant difference from the robot's file.
 
-        Parameters change by more than noise, and the change matters: positions or orientations
-        move by more than their uncertainty, or poses not used are predicted much better.
+        Parameters change by more than noise, and the change has an effect: positions or
+        orientations move by more than their uncertainty, or held-out poses are predicted much
+        better.
         """
         if self.change.by_noise:
             return False
@@ -120,16 +124,16 @@ class Outcome:
 
     @property
     def worse(self) -> bool:
-        """Whether errors at held-out poses are larger than before, and not only by noise."""
+        """Whether errors at held-out poses are larger than before by more than noise."""
         return self.verified.worse_than(self.before)
 
     @property
     def good(self) -> bool:
-        """Whether there is no objection to adopting it."""
+        """Whether there is no objection to adopting the calibration."""
         return not self.objections()
 
     def objections(self) -> list[str]:
-        """Return the objections to adopting it, each with what to do."""
+        """Return the objections to adopting the calibration, each with the action to take."""
         found, told = self.found, []
         if not found.converged:
             told.append(
@@ -169,7 +173,7 @@ class Outcome:
         return told + self._points() + self._islands() + self._impossible()
 
     def _too_uncertain(self) -> list[str]:
-        """Return objections to the predicted error, and to errors much larger than predicted.
+        """Return objections if the predicted error is large, or the actual error much larger.
 
         Errors at poses that were measured show whether a calibration is better than the file. Then
         only the user decides how accurate it must be; otherwise the prediction must be small.
@@ -199,7 +203,7 @@ class Outcome:
 
     @property
     def _better(self) -> bool:
-        """Whether held-out poses are predicted better than by the robot's file."""
+        """Whether the calibration predicts held-out poses better than the robot's file does."""
         return self.verified.mean_mm < self.before.mean_mm and not self.worse
 
     def _points(self) -> list[str]:
@@ -222,9 +226,10 @@ class Outcome:
         return told
 
     def _islands(self) -> list[str]:
-        """Return the markers that no image connects with the others, as in the thesis' 3.7.3.
+        """Return the markers that no image connects with the others, thesis, section 3.7.3.
 
-        The map leaves them out. Poses at which only they were seen then have no image.
+        The map leaves these markers out. Poses at which the camera saw no other markers then have
+        no image.
         """
         if self.cover is None or not self.cover.apart:
             return []
@@ -234,7 +239,7 @@ class Outcome:
         ]
 
     def insignificance(self) -> str | None:
-        """Return why there is no significant change; None if there is one."""
+        """Return the reason why the change is not significant; None if it is significant."""
         change = self.change
         if self.told_from_file:
             return None
@@ -251,7 +256,7 @@ class Outcome:
         )
 
     def _impossible(self) -> list[str]:
-        """Return identified values that are impossible for this robot."""
+        """Return texts about identified values that are impossible for this robot."""
         try:
             faults = calibration_of(self, 1, CalibrationFiles(""), simulated=False).faults(
                 self.robot
@@ -262,7 +267,7 @@ class Outcome:
         return [f"{key}: {problem}: {what}" for key, problem in faults]
 
     def advice(self) -> str:
-        """Return the benefit of more poses."""
+        """Return the benefit of more poses as text."""
         return (
             f"{MORE} more poses would improve {self.predicted_3_sigma_mm:.2f} mm to "
             f"{self.with_more_3_sigma_mm:.2f} mm (3 sigma, predicted)"
@@ -327,7 +332,7 @@ class Outcome:
         )
 
     def proof(self) -> list[str]:
-        """Return the errors at the poses that verify it, as text."""
+        """Return the errors at the poses that verify the calibration, as text."""
         lines = [] if self.noise is None else self.noise.lines()
         if self.verified.errors_m.size:
             lines.append(
@@ -370,7 +375,7 @@ class Outcome:
         return lines
 
     def as_json(self) -> dict[str, Any]:
-        """Return everything for JSON."""
+        """Return the whole outcome as JSON."""
         return {
             "good": self.good,
             "verdict": self.verdict(),
@@ -450,7 +455,7 @@ def calibration_of(
     """Return the file of a calibration; raises pydantic's ValidationError for invalid values."""
     robot, found = outcome.robot, outcome.found
     platform = robot.platform
-    assert platform is not None  # the fit was of one
+    assert platform is not None  # the fit needs a platform
     geometry, k = found.geometry, len(platform.home_m)
     kernel = geometry.kernel_geometry()
     rows = len(geometry.rows)

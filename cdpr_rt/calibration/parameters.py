@@ -42,35 +42,37 @@ EXIT, OFFSET, DRUM, ANCHORS, PULLEY = slice(0, 3), 3, 4, slice(5, 8), 8
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Prior standard deviations: of the file's geometry, and of readings."""
+    """Prior standard deviations of the file's geometry and of readings."""
 
     exit_m: float = 0.05
     """Standard deviation of each coordinate of an exit point: a tape measure's."""
     offset_m: float = 0.2
     """Standard deviation of a cable's length when the encoders began to count."""
     drum: float = 0.005
-    """Relative, of the cable that a turn of the motor pays out."""
+    """Relative standard deviation of the cable paid out per motor turn."""
     anchor_m: float = 0.002
     pulley_m: float = 0.003
     elongation: float = 0.5
-    """Relative, of the elongation by tension."""
+    """Relative standard deviation of the elongation by tension."""
     length_m: float = 0.0003
-    """Standard deviation of a cable length by the encoder, from one pose to the next."""
+    """Standard deviation of a cable length by the encoder, independent at each pose."""
     length_known: bool = False
-    """Whether `length_m` is known; otherwise the readings show whether it is larger."""
+    """Whether `length_m` is known; otherwise it may be increased by the readings."""
     tension_N: float = 3.0
-    """Standard deviation of a tension by the motor's torque: its dry friction."""
+    """Standard deviation of a tension by the motor's torque, due to dry friction."""
     yielding: float = 1.0
-    """Factor on the file's elongation with which noise of tensions makes lengths uncertain."""
+    """Factor on the file's elongation for the uncertainty of lengths due to noise of tensions."""
     slope_noise: float = 0.0
-    """Spurious information about the elongation by noise of tensions, per pose, which the fit takes
-    out; see `cdpr_rt.calibration.fit`."""
+    """Spurious information about the elongation due to noise of tensions, per pose, which the fit
+    subtracts; see `cdpr_rt.calibration.fit`."""
     alike: float = 1.0
-    """Number of successive readings with the same error: together they count as one."""
+    """Number of successive readings that together count as one, because they have the same
+    error."""
     aim_rad: float = math.inf
-    """Standard deviation of the platform's rotation about its target; inf if that is not used."""
+    """Standard deviation of the platform's rotation about its target; inf if targets are not
+    used."""
     loose_drum: float | None = None
-    """In place of `drum` if readings show that the file's drums are wrong."""
+    """Replaces `drum` if readings show that the file's drums are wrong."""
 
     def of_cable(self) -> FloatArray:
         """Return the standard deviations of a cable's parameters, (9,)."""
@@ -90,14 +92,15 @@ class CableGeometry:
 
     model: PlatformModel
     compliance_1_N: FloatArray
-    """1/EA of each cable by the file, 0 for cables that are modelled as rigid; (n,)."""
+    """1/EA of each cable by the file, (n,), 0 for rigid cables."""
     weight_N_m: FloatArray
     identified: tuple[ParameterKind, ...] = USUAL
     knowledge: Knowledge = field(default_factory=Knowledge)
     cable: FloatArray = field(default_factory=lambda: np.zeros((0, CABLE_ROWS)))
     elongation: float = 0.0
     cable_names: tuple[str, ...] = ()
-    """Names of their axes in the robot's file, "" for unnamed axes; empty if all are unnamed."""
+    """Names of the cables' axes in the robot's file, "" for unnamed axes; empty if all are
+    unnamed."""
 
     @classmethod
     def of(
@@ -108,8 +111,9 @@ class CableGeometry:
     ) -> Self:
         """Return the geometry of a robot's file.
 
-        Elongation is left out if the file models the cables as rigid. Raises InvalidRequestError
-        without platform, and if the platform's tilt would be taken for errors of the geometry.
+        Elongation is not identified if the file models the cables as rigid. Raises
+        InvalidRequestError if there is no platform, or if the tilt of the platform would look like
+        errors of the geometry.
         """
         if robot.platform is None:
             raise InvalidRequestError(f"{robot.path}: {NO_PLATFORM}")
@@ -156,12 +160,12 @@ class CableGeometry:
 
     @property
     def turns_freely(self) -> bool:
-        """Whether the platform turns freely in its plane, until the tensions have no moment."""
+        """Whether the platform turns freely in its plane until the tensions exert no moment."""
         return self.model.kinematics.turns_freely
 
     @cached_property
     def rows(self) -> tuple[int, ...]:
-        """Indices of the identified ones among a cable's nine parameters."""
+        """Indices of the identified parameters among the nine of a cable."""
         return tuple(
             row
             for kind in self.identified
@@ -171,7 +175,7 @@ class CableGeometry:
 
     @property
     def shared(self) -> int:
-        """Number of parameters that all cables share: the elongation, or none."""
+        """Number of parameters that all cables share: 1 for the elongation, or 0."""
         return int("elongation" in self.identified)
 
     @property
@@ -213,7 +217,7 @@ class CableGeometry:
         return named or f"cable {cable + 1}"
 
     def cables_text(self, cable: int, alike: Iterable[int], why: str = "") -> str:
-        """Return a cable's name, and in brackets the others that it might be, and why."""
+        """Return a cable's name and, in brackets, the cables that may be meant instead, and why."""
         others = ", ".join(map(self.cable_name, alike))
         return self.cable_name(cable) + (f" (or {others}{why})" if others else "")
 

@@ -1,6 +1,6 @@
 """Slips in manually measured points, found by comparison with lengths at the same poses.
 
-Without points, lengths and prior geometry put the platform's point of pose j at
+Without points, lengths and prior geometry give the position of the platform's point at pose j as
 
     p_j = x_j + A_j (θ - θ_0) + e_j,    θ ~ N(θ_L, C),
 
@@ -8,9 +8,9 @@ linearised at θ_0. Measured points q then have residuals y = q - x - A (θ_L - 
 
     S = A C A^T + Cov(e) + σ².
 
-Each slip has points q' in place of q, or free columns in y. The slip with the least
-y^T S^-1 y + 2 for each free number (Akaike) explains the points. A point that contradicts all
-others has a constant cost for every tried slip, so that no single point decides. Wrong drums and
+A slip either replaces the points q by q', or adds free columns to y. The slip with the least y^T
+S^-1 y, plus 2 for each free parameter (Akaike), explains the points. A point that contradicts all
+others has the same constant cost for every slip, so that no single point decides. Wrong drums and
 exit points of the robot's file are tried in the same way.
 """
 
@@ -34,7 +34,7 @@ from cdpr_rt.calibration.residuals import linearise
 
 _AXES = "xyz"
 _UNITS: Final = {10.0: "cm", 1000.0: "m", 25.4: "inches", 0.1: "tenths of a mm"}
-"""mm of each unit that may be typed in place of mm."""
+"""Size in mm of each unit that may have been used instead of mm."""
 _POINT_COST: Final = 25.0
 """Cost of a point that contradicts all others, in squared standard deviations."""
 _MOST_BAD: Final = 0.25
@@ -42,19 +42,19 @@ _MOST_BAD: Final = 0.25
 _GAIN: Final = 12.0
 """Least cost by which a slip must fit better than no slip."""
 _SCALE_GAIN: Final = 5.0
-"""The same for the scale alone, which the drums of any robot determine."""
+"""The same for a slip of the scale alone, which the drums of any robot determine."""
 MARGIN: Final = 9.0
 """Least cost by which one explanation must fit better than another."""
 _NOISIER: Final = (1.0, 2.0, 4.0)
-"""Tried factors on the given standard deviations of points."""
+"""Factors on the given standard deviations of points that are tried."""
 _ODD: Final = 1e-3
-"""Chance below which points contradict the lengths."""
+"""Probability below which points contradict the lengths."""
 _MISFIT: Final = 9.0
-"""Sum of squares over its expectation above which nothing explains the points."""
+"""Ratio of the sum of squares to its expectation above which no slip explains the points."""
 _LEAST, _MOST = 2, 80
 """Least and largest number of points that are examined for a common slip."""
 _GROSS: Final = 300.0
-"""Reduction of the cost by a slip above which no other explanation is considered."""
+"""If a slip reduces the cost by more than this, no other explanation is considered."""
 _SHIFTS: Final = (1, -1, 2, -2)
 _FAR_m2: Final = 0.04
 _BEST: Final = 5
@@ -64,11 +64,12 @@ _SCALE, _SHIFT_m, _TURN_rad = 0.1, 1.0, 0.5
 _UNKNOWN_m2: Final = 100.0
 _SINGULAR, _ROUNDING = 1e-10, 1e-9
 _DRUM, _EXIT_m, _ELONGATION = 0.05, 0.1, 3.0
-"""Standard deviations of drums, exit points and elongation of a wrong file."""
+"""Standard deviations of drums, exit points and elongation if the file is wrong."""
 _NEAR, _NEAR_SHARE = 4.0, 0.05
-"""Distance at which a slip explains a single point: standard deviations, and share of its error."""
+"""Largest distance that remains if a slip explains a single point: in standard deviations, and as a
+share of the point's error."""
 _HOME_SHARE: Final = 0.5
-"""Standard deviation of home over the tolerance for the platform's place there."""
+"""Ratio of the standard deviation of home to the tolerance of the platform's position there."""
 
 
 @dataclass(frozen=True)
@@ -76,17 +77,17 @@ class SlipVerdict:
     """Fault of the measured points as a whole."""
 
     text: str = ""
-    """The slip or contradiction, and what to do; empty for none."""
+    """The slip or contradiction, and the action to take; empty for none."""
     undecided: bool = False
     """Whether the robot may be the cause instead."""
     off: float = 0.0
-    """Relative error of the scale, or in m."""
+    """Size of the slip: relative for the scale, otherwise in m."""
     explained: bool = True
     """Whether points agree with lengths after the correction."""
     cost: float = 0.0
-    """Of the best explanation."""
+    """Cost of the best explanation."""
     sure: bool = False
-    """Whether it fully explains a gross contradiction, which no other reading could."""
+    """Whether the slip fully explains a gross contradiction that no other reading can explain."""
 
 
 @dataclass(frozen=True)
@@ -117,22 +118,22 @@ class _Slip:
     name: str
     points: Points
     cost: float
-    """Cost of choosing it among similar slips."""
+    """Cost of choosing this slip among similar ones."""
     columns: FloatArray | None = None
-    """(M, k, c), each at its standard deviation."""
+    """The free columns (M, k, c), each scaled by its standard deviation."""
 
 
 @dataclass(frozen=True)
 class _Score:
-    """How well points agree with lengths after correcting a slip."""
+    """Agreement of points and lengths after a slip has been corrected."""
 
     cost: float
     squares: float
     """y^T S^-1 y of the points that agree."""
     count: int
-    """Number of their coordinates."""
+    """Number of coordinates of the points that agree."""
     bad: int
-    """Points that contradict all others."""
+    """Number of points that contradict all others."""
     costs: tuple[float, ...]
     """The cost for each of `_NOISIER`."""
     y: FloatArray
@@ -142,7 +143,7 @@ class _Score:
     W: tuple[FloatArray, ...]
     """S^-1 for each of `_NOISIER`; 0 for coordinates that are unknown or contradict all others."""
     free: FloatArray
-    """(c,), sizes of the columns."""
+    """Sizes of the free columns, (c,)."""
 
     @property
     def odd(self) -> bool:
@@ -167,7 +168,7 @@ class _ByLengths:
         variance_factor: float,
         first_m: FloatArray,
     ) -> None:
-        """Take the file, the geometry to linearise at, and the target of the first pose (3,)."""
+        """Take the file, the geometry for the linearisation, and the first pose's target (3,)."""
         blind = seen.unmeasured()
         there = locate(at, blind.without_jumps(jumps_m)).poses
         rows = linearise(at, blind, there, jumps_m)
@@ -204,7 +205,7 @@ class _ByLengths:
     def _stands_at_home(
         self, file: CableGeometry, first_m: FloatArray, there_m: FloatArray
     ) -> None:
-        """Include the place of the first pose, home, with the accuracy of the robot's file."""
+        """Include the position of the first pose, home, with the accuracy of the robot's file."""
         platform, k = file.model.platform, file.coordinates
         S = self.A[0] @ self.C @ self.A[0].T + self.own[0]
         S += (_HOME_SHARE * platform.home_tolerance_m) ** 2 * np.eye(k)
@@ -214,7 +215,7 @@ class _ByLengths:
         self.C = self.C - gain @ self.A[0] @ self.C
 
     def score(self, slip: _Slip) -> _Score:
-        """Return how well points agree with the lengths after correcting a slip."""
+        """Return the agreement of points and lengths after a slip has been corrected."""
         points = slip.points
         count, k = points.place_m.shape
         size = count * k
@@ -255,13 +256,13 @@ class _ByLengths:
         return np.asarray(self.values + self.change + self.C @ (score.A.T @ (score.W[0] @ score.y)))
 
     def cost_of_file(self, score: _Score, directions: FloatArray, most: float) -> float:
-        """Return the cost if the file errs by `most` in directions (P, c) of parameters."""
+        """Return the cost if the file has errors `most` in directions (P, c) of parameters."""
         inverse = directions / self.known[:, None] ** 2
         by_points = score.A @ self.C @ inverse
         costs = []
         for cost, W in zip(score.costs, score.W, strict=True):
             first = (self.values + self.change) @ inverse + by_points.T @ W @ score.y
-            # from the prior, less what lengths take of it, and from points
+            # information from the prior and lengths, and from points
             second = directions.T @ inverse - inverse.T @ self.C @ inverse
             second = second + by_points.T @ W @ by_points + np.eye(len(first)) / most**2
             costs.append(cost - float(first @ np.linalg.solve(second, first)))
@@ -289,7 +290,7 @@ def _log_size(W: FloatArray, used: BoolArray) -> float:
 
 
 def _worst_row(W: FloatArray, y: FloatArray, k: int) -> tuple[int, float]:
-    """Return the row that contradicts all others most, and the reduction by leaving it out."""
+    """Return the row that contradicts the others most, and the reduction of cost without it."""
     pulled = (W @ y).reshape(-1, k)
     blocks = np.einsum("iaib->iab", W.reshape(len(pulled), k, len(pulled), k))
     left = np.linalg.pinv(blocks, rcond=_ROUNDING, hermitian=True)
@@ -300,16 +301,16 @@ def _worst_row(W: FloatArray, y: FloatArray, k: int) -> tuple[int, float]:
 
 
 def slipped(file: CableGeometry, blind: Fit, seen: Observations) -> SlipVerdict:
-    """Return the fault of the points of `seen`, given `blind`, the fit without any of them.
+    """Return the common fault of the points of `seen`; `blind` is the fit without any points.
 
-    `file` is the robot's.
+    `file` is the geometry of the robot's file.
     """
     points = Points.of(seen, file.coordinates)
     if len(points.pose) < _LEAST:
         return SlipVerdict()
     at, jumps_m = blind.geometry, blind.jumps_m
     verdict, said = SlipVerdict(), "none yet"
-    for _ in range(_ROUNDS):  # linearise each at the result of the one before
+    for _ in range(_ROUNDS):  # each round linearises at the result of the one before
         model = _ByLengths(file, at, blind.seen, jumps_m, blind.variance_factor, seen.start[0, 0])
         verdict, values = _judged(file, model, points)
         if verdict.text == said:
@@ -322,7 +323,7 @@ def slipped(file: CableGeometry, blind: Fit, seen: Observations) -> SlipVerdict:
 def cost_of_readings(
     file: CableGeometry, blind: Fit, seen: Observations, faults: int
 ) -> SlipVerdict:
-    """Return the verdict that `faults` wrong lengths, left out of `blind`, explain the points."""
+    """Return the verdict that `faults` wrong lengths, not used in `blind`, explain the points."""
     points = Points.of(seen, file.coordinates)
     model = _ByLengths(
         file, blind.geometry, blind.seen, blind.jumps_m, blind.variance_factor, seen.start[0, 0]
@@ -334,7 +335,7 @@ def cost_of_readings(
 def _judged(
     file: CableGeometry, model: _ByLengths, points: Points
 ) -> tuple[SlipVerdict, FloatArray]:
-    """Return the verdict, and the parameters (P,) that fit it best."""
+    """Return the verdict, and the parameters (P,) that fit best with it."""
     null = model.score(_Slip("", points, 0.0))
     slips = [(one, model.score(one)) for one in _slips(points, model, null)]
     best, score = min(slips, key=lambda one: one[1].cost)
@@ -357,7 +358,7 @@ def _judged(
 
 
 def _of_robot(file: CableGeometry, model: _ByLengths, null: _Score) -> list[tuple[float, str]]:
-    """Return possible faults of the robot's file instead, with cost and text."""
+    """Return faults of the robot's file that may be the cause instead, with cost and text."""
     size, rows, k = len(model.known), file.rows, file.coordinates
     each = np.eye(size)
     tried: list[tuple[str, FloatArray, float]] = []
@@ -414,14 +415,14 @@ def _slips(points: Points, model: _ByLengths, null: _Score) -> Iterator[_Slip]:
 
 
 def _turned(place_m: FloatArray) -> FloatArray:
-    """Return the derivatives (M, k, t) of points by small turns about the axes."""
+    """Return the derivatives (M, k, t) of points by small rotations about the axes."""
     if place_m.shape[1] == 2:
         return np.stack([-place_m[:, 1], place_m[:, 0]], axis=1)[..., None]
     return np.stack([np.cross(axis, place_m) for axis in np.eye(3)], axis=2)
 
 
 def _turned_near(points: Points, model: _ByLengths) -> Points | None:
-    """Return the points turned and moved to their places by lengths; None for too few."""
+    """Return the points rotated and moved to the positions by lengths; None if too few."""
     k = points.place_m.shape[1]
     whole = np.isfinite(points.place_m).all(axis=1)
     if whole.sum() < k:
@@ -464,7 +465,7 @@ def _other_orders(points: Points, model: _ByLengths) -> Iterator[_Slip]:
 
 
 def _renumbered(points: Points, by: int, start: int, lines: bool, poses: int) -> Points:
-    """Return points assigned to other pose numbers, or other lines, from one line on."""
+    """Return points assigned to other pose numbers, or to other lines, from line `start` on."""
     count = len(points.pose)
     line, pose = np.arange(count), points.pose.copy()
     if lines:
@@ -505,7 +506,7 @@ def _exchanged(points: Points, model: _ByLengths) -> Iterator[_Slip]:
 
 
 def _plain_cost(model: _ByLengths, information: FloatArray, points: Points) -> float:
-    """Return y^T S^-1 y with all points, if only C couples them (Woodbury)."""
+    """Return y^T S^-1 y with all points, which only C couples (Woodbury)."""
     known = np.isfinite(points.place_m)
     A = model.A[points.pose][known]
     y = (points.place_m - model.place_m[points.pose])[known] - A @ model.change
@@ -518,7 +519,7 @@ def _plain_cost(model: _ByLengths, information: FloatArray, points: Points) -> f
 
 
 def row_slip(measured_m: FloatArray, there_m: FloatArray, std_m: float) -> str:
-    """Return an explanation of a single point (k,), nan if not measured; empty for none."""
+    """Return a slip that explains a single point (k,), nan if not measured; empty for none."""
     k = len(measured_m)
     tried = {f"it is in {unit}": mm * measured_m for mm, unit in _UNITS.items()}
     for name, order, sign in _axes(k):

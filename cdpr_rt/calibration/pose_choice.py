@@ -1,6 +1,6 @@
-"""Choose from many poses: those spread out most, or those most informative about the geometry.
+"""Choose poses that are spread out most, or that are most informative about the geometry.
 
-Both take one pose after the other, each the best in addition to those already taken.
+Both methods take one pose after the other, each the best one in addition to those already taken.
 """
 
 from __future__ import annotations
@@ -21,20 +21,21 @@ from cdpr_rt.model.cable_kernel import run_poses
 from cdpr_rt.model.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1
-"""Prior standard deviation of exit points and initial lengths: a tape measure's."""
+"""Prior standard deviation of exit points and initial lengths, measured by tape."""
 LENGTH_m, POSITION_m, ROTATION_rad = 1e-3, 5e-3, 5e-3
-"""Standard deviations of measurements at a pose: of lengths, and of the pose by a camera."""
+"""Standard deviations at a pose: of lengths, and of position and rotation by a camera."""
 HAND_EYE_m, HAND_EYE_rad = 0.1, 0.2
-"""Prior standard deviation of the camera's place on its platform."""
+"""Prior standard deviations of the camera's pose on its platform."""
 _AT_ONCE = 64
 
 
 def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
-    """Return which `count` of the positions (m, d) lie furthest from each other.
+    """Return the indices of `count` positions (m, d) that are far from each other.
 
     The first is the furthest from the middle. Each further one has the largest distance to the
-    nearest one taken (Gonzalez, 1985: no choice has twice its least distance). A distance is
-    the norm of differences times `arms` (d,), which makes angles lengths.
+    nearest one already taken (Gonzalez, 1985: the least distance is more than half of that of the
+    best choice). A distance is the norm of differences multiplied by `arms` (d,), which converts
+    angles to lengths.
     """
     scaled = np.asarray(positions, float) * arms
     nearest = np.linalg.norm(scaled - scaled.mean(axis=0), axis=1)
@@ -47,11 +48,11 @@ def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
 
 
 def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntArray:
-    """Return which `count` of the poses (m, 4, 3) are most informative, by cables and camera.
+    """Return the indices of the `count` poses (m, 4, 3) most informative by cables and camera.
 
-    Greedily D-optimal: each raises log det of the information most, given those before. That of
-    a pose is R^T R, see `pose_rows`. The gain of a pose falls as others are taken, so only poses
-    that may still be the best are computed again (Minoux, 1978).
+    The choice is greedily D-optimal: each pose increases log det of the information most, given
+    those before. The information of a pose is R^T R, see `pose_rows`. The gain of a pose falls as
+    others are taken, so only poses that may still be the best are computed again (Minoux, 1978).
     """
     rows = pose_rows(geometry, poses)
     covariance = np.eye(rows.shape[2])
@@ -71,7 +72,7 @@ def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntAr
 
 
 def _gains(rows: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the gain of log det by each pose's rows (m, r, P), (m,)."""
+    """Return the gains (m,) of log det by the rows (m, r, P) of each pose."""
     inner = np.eye(rows.shape[1]) + rows @ covariance @ np.swapaxes(rows, 1, 2)
     return np.asarray(np.linalg.slogdet(inner)[1])
 
@@ -79,9 +80,9 @@ def _gains(rows: FloatArray, covariance: FloatArray) -> FloatArray:
 def pose_rows(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
     """Return the information of lengths and a camera at poses (m, 4, 3), R (m, n + 6, P).
 
-    The parameters are those of `geometry`, then the camera's place on the platform, in units of
-    prior deviations. With derivatives J_x by the pose, which is unknown, and J_p by
-    the parameters, R = (1 - J_x (J_x^T J_x)^-1 J_x^T) J_p. The camera measures its own pose.
+    The parameters are those of `geometry`, then the camera's pose on the platform, in units of
+    prior deviations. With the derivatives J_x by the unknown pose and J_p by the parameters, R = (1
+    - J_x (J_x^T J_x)^-1 J_x^T) J_p. The camera measures its own pose.
     """
     m, n, size, free = len(poses), geometry.n, geometry.size, list(geometry.free)
     tension = np.tile(0.5 * (geometry.model.low_N + geometry.model.high_N), (m, 1))
@@ -108,7 +109,7 @@ def cable_geometry(model: PlatformModel) -> CableGeometry:
 
 
 def predicted_deviation_m(geometry: FloatArray, poses: FloatArray) -> float:
-    """Return the deviation of exit points' coordinates after poses (m, 4, 3), root mean square.
+    """Return the rms standard deviation of exit point coordinates after poses (m, 4, 3).
 
     `geometry` (13, n) is that of `cable_kernel`.
     """
@@ -119,7 +120,7 @@ def predicted_deviation_m(geometry: FloatArray, poses: FloatArray) -> float:
 
 
 def information_rows(geometry: FloatArray, poses: FloatArray) -> FloatArray:
-    """Return the rows of each pose for each cable, (m, n, 4), over their standard deviation."""
+    """Return the rows of each pose and cable, (m, n, 4), divided by their standard deviation."""
     cables = np.empty((len(poses), KERNEL_ROWS, geometry.shape[1]))
     run_poses(geometry, poses, cables)
     turned = (cables[:, 3:6] ** 2).sum(axis=1)

@@ -26,7 +26,7 @@ from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.robot_arrays import limits_of
 
-# Data of a camera on the platform in a calibration: its setup, and its images.
+# Data of the camera on the platform: its setup and its images.
 
 _DECIMALS_px = 4
 _Length_m = Annotated[float, Field(ge=-100.0, le=100.0)]
@@ -45,37 +45,38 @@ class HandEye(Profile):
     """Rotation vector from the camera's frame to the platform's; the camera looks along z, and x
     points to the right in the image."""
     position_std_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.005
-    """Standard deviation of each coordinate: a ruler's."""
+    """Standard deviation of each coordinate, measured by ruler."""
     rotation_std_deg: Annotated[float, Field(ge=1e-4, le=180.0)] = 2.0
-    """About each axis."""
+    """Standard deviation of the rotation about each axis."""
 
 
 class CameraSetup(Profile):
     """The camera that took the images, and the sheets that it saw."""
 
     intrinsics: CameraIntrinsics
-    """With `sigmas` the fit corrects them within these; without `sigmas` they are held."""
+    """Intrinsics of the camera. The fit corrects them within their `sigmas`; without `sigmas` they
+    are fixed."""
     sheets: MarkerSheets
-    """Sizes of the markers, and places of those that are known."""
+    """Sizes of the markers, and the known marker poses."""
     sigma_px: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
     """Standard deviation of a coordinate of a corner; by default estimated from the images."""
     size_std: Annotated[float, Field(ge=1e-6, le=0.5)] = 0.002
     """Relative standard deviation of the size that all sheets share."""
     known_std_m: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.001
-    """Standard deviation of each coordinate of a corner of a marker whose place is known."""
+    """Standard deviation of each coordinate of a corner of a marker with a known pose."""
     hand_eye: HandEye | None = None
-    """None if unknown: then the robot's rotations determine it."""
+    """The hand-eye transform; None if unknown, in which case the robot's rotations determine it."""
 
     @classmethod
     def of(cls, intrinsics: CameraIntrinsics, sheets: MarkerSheets) -> CameraSetup:
-        """Return the setup of two files; known places are as accurate as the sheets' file says."""
+        """Return the setup of two files; that of the sheets gives the accuracy of known poses."""
         setup = cls(intrinsics=intrinsics, sheets=sheets)
         if sheets.known_std_m is None:
             return setup
         return setup.model_copy(update={"known_std_m": sheets.known_std_m})
 
     def as_found(self, lens: FloatArray, size_change: float) -> CameraSetup:
-        """Return it with another lens (9,), sheets larger by a relative change, and no hand_eye."""
+        """Return the setup with another lens (9,), relatively changed sheets, and no hand_eye."""
         fx, fy, cx, cy, *distortion = lens.tolist()
         found = {"focal_px": (fx, fy), "centre_px": (cx, cy), "distortion": tuple(distortion)}
         sheets, by = self.sheets, 1.0 + size_change
@@ -95,19 +96,19 @@ class MarkerReading(Profile):
 
     id: _Id
     corners_px: Annotated[tuple[_Pair, ...], Field(min_length=4, max_length=4)]
-    """In the order of detectors: clockwise from the marker's upper left."""
+    """Corners in the order of detectors: clockwise from the marker's upper left."""
 
 
 class ImageReading(Profile):
-    """Image of a pose; `markers` is empty if none was usable."""
+    """Image at a pose; `markers` is empty if no marker was usable."""
 
     markers: Annotated[tuple[MarkerReading, ...], Field(max_length=1024)] = ()
     repeated: tuple[_Id, ...] = ()
-    """Ids that it shows more than once."""
+    """Ids that the image shows more than once."""
     mirrored: tuple[_Id, ...] = ()
-    """Ids that only its mirror image shows."""
+    """Ids that only the mirror image shows."""
     problem: Annotated[str, Field(max_length=500)] | None = None
-    """Fault of the image as a whole, as text; None if it has none."""
+    """Fault of the image as a whole, as text, or None."""
 
     @classmethod
     def of(cls, seen: Sighting) -> Self:
@@ -123,7 +124,7 @@ class ImageReading(Profile):
         )
 
     def sighting(self, name: str) -> Sighting:
-        """Return it as a detector would; an id that is listed twice counts as repeated."""
+        """Return the equivalent sighting of a detector; an id listed twice counts as repeated."""
         ids = [one.id for one in self.markers]
         twice = {marker for marker in ids if ids.count(marker) > 1}
         corners = {one.id: np.array(one.corners_px) for one in self.markers if one.id not in twice}
@@ -159,7 +160,7 @@ class Observations:
     start: FloatArray
     """Poses at which the search begins, as arrays of `Pose`, (N, 4, 3)."""
     used: BoolArray
-    """Whether a length counts, (N, n)."""
+    """Whether a length is used, (N, n)."""
     position_m: FloatArray
     """Measured positions in the room, (N, 3)."""
     position_std_m: FloatArray
@@ -167,26 +168,26 @@ class Observations:
     rotation: FloatArray
     """Measured rotations, (N, 3, 3)."""
     rotation_std_rad: FloatArray
-    """About each of the room's axes, (N, 3)."""
+    """Standard deviations of rotations about each of the room's axes, (N, 3)."""
     target_m: FloatArray
     """Point of the platform to which `position_m` belongs, (3,)."""
     reference_m: FloatArray
     """Lengths when the encoders began to count; drum errors have no effect there, (n,)."""
     target_rotation: FloatArray
-    """Rotations that the platform was told to have, (N, 3, 3)."""
+    """Rotations that were commanded, (N, 3, 3)."""
     jumps: tuple[tuple[int, int], ...] = ()
     """(cable, pose) at which a cable's length jumped: from this pose on it has another offset."""
     markers: SeenMarkers | None = None
     """Markers seen by the camera on the platform, an image for each pose."""
     tension_free: FloatArray | None = None
-    """Projections onto the remaining noise of tensions, (N, n, n), after their balance has removed
-    the rest; None if all remains."""
+    """Projections (N, n, n) onto the noise of tensions that remains after the correction by
+    equilibrium; None if nothing was corrected."""
     time_s: FloatArray | None = None
-    """Times of readings while the platform moves, (N,); None if it stood still."""
+    """Times of readings while the platform moves, (N,); None if the platform stood still."""
     every: int = 1
-    """The fit uses one reading in this number; errors of its neighbours are alike."""
+    """The fit uses every reading of this spacing; errors of the readings between are similar."""
     tension_assumed: bool = False
-    """Whether no tension was measured: then the elongation cannot be identified."""
+    """Whether no tension was measured, so that the elongation cannot be identified."""
     std_guessed: bool = False
     """Whether the standard deviation of positions is not known: the fit then estimates it."""
 
@@ -194,7 +195,7 @@ class Observations:
     def of_lengths(
         cls, length_m: FloatArray, tension_N: FloatArray, start: FloatArray
     ) -> Observations:
-        """Return lengths (N, n) and tensions (N, n) alone; raises InvalidRequestError."""
+        """Return observations with lengths and tensions (N, n) only; raises InvalidRequestError."""
         lengths, tensions = np.array(length_m, float), np.array(tension_N, float)
         poses = np.array(start, float)
         count = len(lengths)
@@ -259,7 +260,7 @@ class Observations:
         )
 
     def unmeasured(self) -> Observations:
-        """Return lengths and tensions alone."""
+        """Return the observations with lengths and tensions only."""
         away = np.full_like(self.position_std_m, np.inf)
         return replace(self, position_std_m=away, rotation_std_rad=away.copy(), markers=None)
 
@@ -285,7 +286,7 @@ class Observations:
         )
 
     def number(self, pose: int) -> int:
-        """Return the number of a pose, counted from 0, as the data count it, from 1."""
+        """Return the number of a pose in the data, counted from 1, for an index from 0."""
         return self.every * pose + 1
 
     def without_jumps(self, offsets_m: FloatArray) -> Observations:
@@ -314,21 +315,22 @@ class PoseReading(Profile):
     """Readings while the platform stood at one pose."""
 
     target: Numbers
-    """The target (d,), as for the program `pose`, or the actual place if the platform did not reach
-    it; the first search begins there."""
+    """The target (d,), as for the program `pose`, or the actual position if the platform did not
+    reach the target. The first search begins there."""
     length_m: Numbers
     """Unstretched lengths by encoders and the robot's file, (n,)."""
     tension_N: Numbers | None = None
-    """None if not measured: the middle of the allowed tensions is assumed."""
+    """Tensions (n,); None if not measured, in which case the middle of the allowed range is
+    assumed."""
     time_s: float | None = None
     """Time of the readings; only for readings while the platform moves."""
     position_m: Numbers | None = None
-    """Measured externally, (3,)."""
+    """Externally measured position, (3,)."""
     position_std_m: float | None = Field(default=None, gt=0)
     rotation: tuple[Numbers, ...] | None = None
     rotation_std_rad: float | None = Field(default=None, gt=0)
     image: ImageReading | None = None
-    """Image of the camera on the platform there."""
+    """Image by the camera on the platform at this pose."""
 
     @model_validator(mode="after")
     def _measured_wholly(self) -> PoseReading:
@@ -355,16 +357,16 @@ class CalibrationData(Profile):
     format: Literal["cdpr-rt geometry data 1"] = "cdpr-rt geometry data 1"
     robot: str
     geometry_sha256: str
-    """Digest of the robot's files as loaded when the platform was measured."""
+    """Digest of the robot's files that were loaded during the measurement."""
     simulated: bool
-    """Whether the robot was simulated; the result is then not used for a real one."""
+    """Whether the robot was simulated; the result is then not valid for a real robot."""
     date: str
     left_out: tuple[str, ...] = ()
-    """Poses that were tried without success, and why."""
+    """Poses that were tried without success, with the reasons."""
     tried: tuple[Numbers, ...] = ()
     """Targets (d,) that were not read, or not reached; a continued run skips them."""
     camera: CameraSetup | None = None
-    """Required if there are images."""
+    """Setup of the camera; required if there are images."""
     restarts: tuple[Annotated[int, Field(ge=1)], ...] = ()
     """Poses, counted from 0, before which the encoders began to count again."""
     poses: tuple[PoseReading, ...] = Field(max_length=100_000)
@@ -421,7 +423,7 @@ class CalibrationData(Profile):
         return replace(seen, jumps=anew, time_s=self._times(), tension_assumed=assumed)
 
     def _tensions(self, robot: Robot, model: PlatformModel) -> FloatArray:
-        """Return tensions (N, n), assumed ones if none was measured."""
+        """Return tensions (N, n); assumed values if no tension was measured."""
         without = [j for j, reading in enumerate(self.poses) if reading.tension_N is None]
         if without and model.kinematics.turns_freely:
             raise InvalidRequestError(
@@ -450,7 +452,7 @@ class CalibrationData(Profile):
         return told
 
     def sightings(self) -> list[Sighting]:
-        """Return the markers in the images of all poses; empty without image."""
+        """Return the markers in the images of all poses; empty if there is no image."""
         return [
             (reading.image or ImageReading()).sighting(f"pose {j + 1}")
             for j, reading in enumerate(self.poses)
@@ -489,11 +491,11 @@ class MeasuredPoint:
     """Measured position of the platform's origin at a pose; nan if not measured."""
 
     pose: int
-    """Counted from 0."""
+    """Index of the pose, counted from 0."""
     position_m: FloatArray
     std_m: float
     std_guessed: bool = False
-    """Whether the file has no standard deviation for it."""
+    """Whether the file gives no standard deviation for this position."""
     turn_rad: FloatArray | None = None
     """Measured rotation vector of the platform (3,); nan for a coordinate without a column."""
     turn_std_rad: float = math.radians(_STD_deg)
@@ -532,7 +534,7 @@ def _cells(path: Path, line: int, names: list[str], row: list[str]) -> dict[str,
     if len(row) > len(names):
         problem = f"{len(row)} cells; allowed: up to {len(names)}, one for each column"
         raise ProfileError(path, f"line {line}", problem)
-    return dict(zip(names, row, strict=False))  # missing cells at the end count as empty
+    return dict(zip(names, row, strict=False))  # missing cells at the end of a row count as empty
 
 
 def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:

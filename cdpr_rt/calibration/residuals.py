@@ -1,8 +1,8 @@
-"""One residual model of all observations, with its derivatives: closure, poses, balance.
+"""Residual model of all observations, with derivatives: loop closure, measured poses, balance.
 
-For cable i at pose j, with the encoder's unstretched length l_ij, offset o_i, drum error s_i
-about the length l_i0 at the start, and stretch S_ij = straight length over unstretched
-length under the tension t_ij at the winch, loop closure (Tremblay, (3.16) to (3.18)) is
+Cable i at pose j has the unstretched length l_ij by the encoder, the offset o_i, and the drum error
+s_i about the initial length l_i0. Its stretch S_ij is the ratio of straight to unstretched length
+under the tension t_ij at the winch. Loop closure (Tremblay, (3.16) to (3.18)) is
 
     f_ij = (l_ij + o_i + s_i (l_ij - l_i0)) S_ij - ρ(a_i, b_i, r_i, x_j)
 
@@ -12,12 +12,14 @@ vector u from exit to anchor, angle θ on the pulley and compliance c_i (1 + κ)
     ∂f/∂a = u    ∂f/∂o = S    ∂f/∂s = (l - l_0) S    ∂f/∂b = -Q^T u    ∂f/∂r = sin θ - θ
     ∂f/∂κ = l c t    ∂f/∂x = -(u, Q b × u)
 
-Measured positions are p + Q c - p~, rotations log(Q Q~^T). If a platform turns freely in its
-plane, Σ t_i (Q b_i × u_i) and its weight's moment are in balance. Each row is divided
-by its standard deviation, and by the root of the number of successive readings that err alike.
+The residuals of measured positions are p + Q c - p~, those of measured rotations log(Q Q~^T). If a
+platform turns freely in its plane, Σ t_i (Q b_i × u_i) and the moment of its weight are in balance.
+Each row is divided by its standard deviation, and by the root of the number of successive readings
+that count as one.
 
-Lengths hardly determine the rotation of some platforms. There it stays near its target: rows of
-poses without a measured rotation are log(Q Q_t^T) with the target's rotation Q_t.
+Lengths hardly determine the rotation of some platforms. For these the rotation is assumed to be
+near its target: poses without a measured rotation have rows log(Q Q_t^T) with the target's rotation
+Q_t.
 """
 
 from __future__ import annotations
@@ -99,9 +101,9 @@ def linearise(
 
 
 def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
-    """Return the standard deviation of each length, including the tension's effect, (N, n).
+    """Return the standard deviation of each length, including the effect of tension, (N, n).
 
-    It is larger by the root of the number of readings that err alike.
+    It is multiplied by the root of the number of readings that count as one.
     """
     known = geometry.knowledge
     uncertain = known.yielding * seen.length_m * geometry.compliance_1_N * known.tension_N
@@ -111,7 +113,7 @@ def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
 
 
 def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
-    """Return encoders' lengths without drum errors at poses (N, 4, 3), (N, n)."""
+    """Return the encoder lengths (N, n) at poses (N, 4, 3), without drum errors."""
     cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))
     run_poses(geometry.kernel_geometry(), poses, cables)
     straight = cables[:, FREE] + cables[:, ARC]
@@ -119,10 +121,10 @@ def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArr
 
 
 def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray) -> FloatArray:
-    """Return straight length over unstretched length, (N, n).
+    """Return the ratio of straight to unstretched length, (N, n).
 
-    Tensions are given at the winches; at the platform the tension is less by the weight of a cable
-    as long as the exit's height above the anchor point.
+    Tensions apply at the winches. At the platform, the tension is lower by the weight per length
+    times the height of the exit point above the anchor point.
     """
     soft = geometry.compliance()
     if not geometry.weight_N_m.any():
@@ -196,7 +198,7 @@ def _balance(
     u = np.swapaxes(cables[:, :2], 1, 2)
     t, rho = seen.tension_N, cables[:, FREE]
     across = arm[..., 0] * u[..., 1] - arm[..., 1] * u[..., 0]
-    # derivative by the anchor's place with a constant arm: t r × (1 - u u^T) / ρ
+    # derivative by the anchor's position with a constant arm: t r × (1 - u u^T) / ρ
     turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
     square = turned - (turned * u).sum(axis=-1, keepdims=True) * u
     by_place = (t / rho)[..., None] * square
@@ -206,7 +208,7 @@ def _balance(
     moment = (t * across).sum(axis=1) + weight_N * centre[:, 0]
     by_angle = (by_place * turned).sum(axis=(1, 2)) - (t * (arm * u).sum(axis=-1)).sum(axis=1)
     by_angle -= weight_N * centre[:, 1]
-    # the moment's standard deviation: that of a tension, with a share of the arms as its lever
+    # standard deviation of the moment: that of a tension, times a share of the arms
     arms = geometry.model.kinematics.geometry[ANCHOR : ANCHOR + 2]
     known = geometry.knowledge
     held = math.sqrt(known.alike) * known.tension_N * _MISSED * float(np.linalg.norm(arms))
@@ -233,7 +235,7 @@ def _measured_poses(
     chosen: list[int],
     out: Linearised,
 ) -> None:
-    """Write the last six rows, of positions and rotations measured from outside."""
+    """Write the last six rows, for externally measured positions and rotations."""
     arm = poses[:, 1:] @ seen.target_m
     first = out.points.start
     known = geometry.knowledge

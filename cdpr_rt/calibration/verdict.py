@@ -25,7 +25,7 @@ from cdpr_rt.calibration.residuals import Linearised, lengths_told, linearise
 from cdpr_rt.errors import InvalidRequestError
 
 _OPEN = 0.5
-"""Remaining share of the prior variance above which a direction counts as undetermined."""
+"""A direction is undetermined if more than this share of its prior variance remains."""
 _EXPLAINED = 0.6
 _LEAST_SPARE = 4
 _AXES = "xyz"
@@ -44,16 +44,18 @@ class OpenDirection:
 
 
 def require_enough(geometry: CableGeometry, seen: Observations) -> None:
-    """Raise InvalidRequestError for fewer readings than unknowns; the message has the difference.
+    """Raise InvalidRequestError for fewer readings than unknowns; the message gives the difference.
 
-    For known poses it is (3.21).
+    For known poses, the condition is (3.21).
     """
     d, n = len(geometry.free), geometry.n
     coordinates = np.isfinite(seen.position_std_m[:, : geometry.coordinates]).sum()
     angles = np.isfinite(seen.rotation_std_rad).sum() if d > geometry.coordinates else 0
     told = int(seen.used.sum() + coordinates + angles) + geometry.turns_freely * seen.poses
     unknown = d * seen.poses + n * (geometry.coordinates + int("offset" in geometry.identified))
-    if seen.markers is not None:  # an image gives the camera's pose on a map with a separate frame
+    if (
+        seen.markers is not None
+    ):  # an image gives the camera's pose in the map, which has a separate frame
         told += d * len(np.unique(seen.markers.image))
         unknown += 12
     each = told / max(seen.poses, 1) - d
@@ -72,7 +74,7 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
 
 
 def open_directions(found: Fit) -> list[OpenDirection]:
-    """Return the directions that stay as uncertain as before, the widest first."""
+    """Return the directions that stay as uncertain as before, the most uncertain first."""
     geometry = found.geometry
     size, known = geometry.size, geometry.known_std()
     if size == 0:
@@ -157,10 +159,11 @@ def _of_single_cables(
 
 
 def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> FloatArray:
-    """Return standard deviations of poses (M, 4, 3) by lengths with this geometry, (M, d).
+    """Return the standard deviations (M, d) of poses (M, 4, 3) by lengths with this geometry.
 
-    By the parameters' uncertainty alone. With `relative`, the rigid motion of the whole room that
-    fits best is removed first, because without measured points its place is unknown.
+    They are due to the uncertainty of the parameters alone. With `relative`, the best-fitting rigid
+    motion of the whole robot is removed first, because without measured points its position in the
+    room is unknown.
     """
     return _std(found, _by_parameters(found, poses, relative))
 
@@ -173,7 +176,8 @@ def _std(found: Fit, A: FloatArray) -> FloatArray:
 
 
 SHARED_SCALE_STD: Final = 0.003
-"""Assumed relative standard deviation of the scale that all measured points share: a tape's."""
+"""Assumed relative standard deviation of the scale common to all measured points, that of a
+tape."""
 
 
 @dataclass(frozen=True)
@@ -186,14 +190,14 @@ class Predicted3Sigma:
 
     @classmethod
     def of(cls, found: Fit, A: FloatArray, larger: float) -> Self:
-        """Return it for derivatives A (M, d, P) of poses: root mean squares times `larger`."""
+        """Return the accuracy for derivatives A (M, d, P) of poses: rms values times `larger`."""
         k = found.geometry.coordinates
         std = 3.0 * larger * np.sqrt((_std(found, A) ** 2).mean(axis=0))
         turns = np.degrees(std[k:])
         return cls(1e3 * float(std[:k].max()), float(turns.max()) if turns.size else None)
 
     def with_shared_scale(self, places_m: FloatArray) -> Self:
-        """Return it including the scale error that all measured points share, at places (M, k)."""
+        """Return the accuracy with the scale error of all measured points, at positions (M, k)."""
         shared_mm = 3e3 * SHARED_SCALE_STD * float(np.sqrt((places_m**2).mean(axis=0)).max())
         return replace(self, position_mm=math.hypot(self.position_mm, shared_mm))
 
@@ -201,7 +205,7 @@ class Predicted3Sigma:
 def predicted_3_sigma(
     found: Fit, poses: FloatArray, relative: bool, larger: float
 ) -> Predicted3Sigma:
-    """Return it at poses (M, 4, 3), with relative orientations, as in `predicted_std`."""
+    """Return the accuracy at poses (M, 4, 3), with relative orientations, see `predicted_std`."""
     A = _by_parameters(found, poses, relative)
     return Predicted3Sigma.of(
         found, _against_mean_orientation(A, found.geometry.coordinates), larger
@@ -209,12 +213,12 @@ def predicted_3_sigma(
 
 
 def absolute_3_sigma(found: Fit, poses: FloatArray, larger: float) -> Predicted3Sigma:
-    """Return it at poses (M, 4, 3) in the frame of the fit, also for orientations."""
+    """Return the accuracy at poses (M, 4, 3) in the frame of the fit, also for orientations."""
     return Predicted3Sigma.of(found, _by_parameters(found, poses, relative=False), larger)
 
 
 def _against_mean_orientation(A: FloatArray, k: int) -> FloatArray:
-    """Return derivatives (M, d, P) of k coordinates, and of orientations less their mean.
+    """Return derivatives (M, d, P) of k coordinates, and of orientations minus their mean.
 
     Measured positions do not determine a common rotation of all orientations: it looks like exit
     points that differ by as much as the anchor points move.
@@ -232,21 +236,22 @@ class CalibrationChange:
     """The same for orientations; 0 if they are not estimated."""
     chi_squared: float
     degrees_of_freedom: float
-    """Number of parameters that observations determine: mean of chi squared for a right file."""
+    """Number of parameters that observations determine: the mean of chi squared if the file is
+    right."""
 
     @property
     def chance(self) -> float:
-        """Probability of as large a change by noise alone."""
+        """Probability that noise alone causes so large a change."""
         degrees = self.degrees_of_freedom
         return float(chi2.sf(self.chi_squared, degrees)) if degrees > 0.0 else 1.0
 
     @property
     def by_noise(self) -> bool:
-        """Whether noise may explain it."""
+        """Whether noise may explain the change."""
         return self.chance >= _CHANCE
 
     def exceeds(self, known: Predicted3Sigma) -> bool:
-        """Return whether positions or orientations move by more than they are known to."""
+        """Return whether positions or orientations move by more than their uncertainty."""
         turned_deg = float(np.degrees(self.turned_rad))
         most_deg = known.orientation_deg
         return 1e3 * self.moved_m > known.position_mm or (
@@ -255,11 +260,11 @@ class CalibrationChange:
 
 
 def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> CalibrationChange:
-    """Return how far a fit is from the robot's file, at poses (M, 4, 3).
+    """Return the change of the robot's file by a fit, at poses (M, 4, 3).
 
-    For parameters v with covariance C and prior covariance K, v^T C^-1 v is about chi squared
-    with P - tr(C K^-1) degrees of freedom if the file is right (Wald). `larger` is a factor
-    on the predicted deviations.
+    If the file is right, v^T C^-1 v has nearly a chi squared distribution with P - tr(C K^-1)
+    degrees of freedom (Wald), for parameters v with covariance C and prior covariance K. `larger`
+    is a factor on the predicted deviations.
     """
     geometry = found.geometry
     v, known, size = geometry.values(), geometry.known_std(), geometry.size
@@ -297,7 +302,7 @@ def _at(found: Fit, poses: FloatArray) -> Linearised:
 
 
 def _less_rigid_motion(A: FloatArray, poses: FloatArray, free: tuple[int, ...]) -> FloatArray:
-    """Return derivatives (M, d, P) less the rigid motion of the room that fits them best."""
+    """Return derivatives (M, d, P) minus the rigid motion of the room that fits them best."""
     count, d, size = A.shape
     place = poses[:, 0] - poses[:, 0].mean(axis=0)
     motions = np.zeros((count, 6, 6))

@@ -1,4 +1,4 @@
-"""Verification of a calibration: compare poses by lengths alone with measurements, held out."""
+"""Verification of a calibration: compare held-out measurements with poses by lengths alone."""
 
 from __future__ import annotations
 
@@ -27,12 +27,13 @@ from cdpr_rt.calibration.residuals import length_std_m
 from cdpr_rt.calibration.verdict import predicted_std
 
 _LEAST_MARKERS = 2
-"""Least markers in an image for a pose: the tilt of a single marker is uncertain."""
+"""Least number of markers in an image for a pose, because the tilt of a single marker is
+uncertain."""
 _LEAST_POSES = 3
 _SURE = 0.975
-"""Quantile of the test whether poses became worse: about two standard errors."""
+"""Quantile for the test of larger errors: about two standard errors."""
 _GROSS = 2.0
-"""Ratio of root mean squares above which errors are worse, whatever the test says."""
+"""Ratio of root mean squares above which errors are larger, regardless of the test."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Scale:
 
     factor: float
     std: float
-    """From leaving out one pose after the other (jackknife); both nan for less than three poses."""
+    """Standard deviation from leaving out one pose after the other (jackknife). Both values are nan
+    for fewer than three poses."""
 
     @classmethod
     def of(cls, told_m: FloatArray, measured_m: FloatArray) -> Scale:
@@ -65,7 +67,7 @@ class Scale:
 
 
 def _ratio(told_m: FloatArray, measured_m: FloatArray) -> float:
-    # sums over pairs are proportional to those about the mean
+    # sums over pairs are proportional to sums of squares about the mean
     squares = [float(((p - p.mean(axis=0)) ** 2).sum()) for p in (measured_m, told_m)]
     return float(np.sqrt(squares[0] / max(squares[1], 1e-12)))
 
@@ -76,7 +78,7 @@ class Verification:
 
     poses: int
     errors_m: FloatArray
-    """Positions by lengths less measured ones, (M, k)."""
+    """Positions by lengths minus measured ones, (M, k)."""
     told_m: FloatArray
     """Positions by lengths, (M, k)."""
     turn_errors_rad: FloatArray
@@ -86,11 +88,11 @@ class Verification:
     squares_m2: FloatArray
     """Sum of squares of the lengths' residuals at each pose, (N,)."""
     by_camera: bool = False
-    """Whether the camera measured the poses, on a map by the images of other poses only."""
+    """Whether the camera measured the poses, using a map from images at other poses only."""
 
     @property
     def kind(self) -> Literal["camera", "points", "none"]:
-        """Kind of the reference with which poses by lengths are compared."""
+        """Kind of reference with which poses by lengths are compared."""
         if not self.errors_m.size:
             return "none"
         return "camera" if self.by_camera else "points"
@@ -107,17 +109,17 @@ class Verification:
 
     @property
     def mean_mm(self) -> float:
-        """Mean distance."""
+        """Mean distance between positions by lengths and measured ones."""
         return 1e3 * float(np.nanmean(self._distance())) if self.errors_m.size else float("nan")
 
     @property
     def worst_mm(self) -> float:
-        """Largest distance."""
+        """Largest distance between positions by lengths and measured ones."""
         return 1e3 * float(np.nanmax(self._distance())) if self.errors_m.size else float("nan")
 
     @property
     def mean_deg(self) -> float:
-        """Mean angle between rotations."""
+        """Mean angle between rotations by lengths and measured ones."""
         turned = np.linalg.norm(self.turn_errors_rad, axis=1)
         return float(np.degrees(turned.mean())) if turned.size else float("nan")
 
@@ -129,10 +131,11 @@ class Verification:
     def worse_than(self, before: Verification) -> bool:
         """Return whether errors are larger than those of `before`, by more than noise explains.
 
-        The mean of the differences of distances d_j is beyond t_0.975 of its standard error
-        (Student's paired test): errors of the measurement are in both. Or the root mean square is
-        above twice that before, because a few gross errors would make the standard error large.
-        Without measured poses, contradictions of the lengths are compared instead.
+        Errors are larger if the mean of the differences of distances d_j exceeds t_0.975 times its
+        standard error (Student's paired test, because both have the same measurement errors). They
+        are also larger if the root mean square is more than twice that before, because a few gross
+        errors make the standard error large. Without measured poses, residuals of the lengths are
+        compared instead.
         """
         now, then = self._squares(), before._squares()
         count = len(now)
@@ -156,7 +159,7 @@ class Verification:
         return len(now) >= _LEAST_POSES and float(then.mean()) > _GROSS**2 * float(now.mean())
 
     def _squares(self) -> FloatArray:
-        """Return squared errors of positions; of lengths if no positions were measured."""
+        """Return squared errors of positions, or of lengths if no positions were measured."""
         return self._distance() ** 2 if self.errors_m.size else self.squares_m2
 
     def _distance(self) -> FloatArray:
@@ -171,7 +174,7 @@ def verify(
 ) -> Verification:
     """Return the errors of poses by `geometry` and lengths alone against measurements.
 
-    If only the camera has measured, the reference is the poses that the camera alone gives.
+    If only the camera has measured, the reference is the poses determined by the camera alone.
     """
     told = seen.without_jumps(jumps_m)
     there = locate(geometry, told)
@@ -194,7 +197,7 @@ def verify(
 
 
 def verifies(seen: Observations) -> bool:
-    """Return whether enough poses were measured, in space, for a separate reference."""
+    """Return whether enough poses were measured in the room for a separate reference."""
     k = seen.position_m.shape[1]
     return int((np.isfinite(seen.position_std_m).sum(axis=1) == k).sum()) >= _LEAST_POSES
 
@@ -204,7 +207,7 @@ def _beside_camera(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return errors of positions, positions, and errors of rotations of `seen.start`, (M, 3).
 
-    Only for poses at which the camera saw enough markers.
+    Only poses at which the camera saw enough markers are included.
     """
     markers = seen.markers
     shown = np.zeros(seen.poses, int)
@@ -232,25 +235,26 @@ def _seen_from_first(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     return (poses[1:, 0] - poses[0, 0]) @ back.T, back @ poses[1:, 1:]
 
 
-# The poses that verify a calibration. The fit to the other poses uses no reading from them.
-# Two things come from all poses: the map of the markers with which the fit begins, and the list
-# of wrong measured points, which do not verify.
+# The held-out poses that verify a calibration. The fit to the other poses uses no reading from
+# them. Two results come from all poses: the marker map with which the fit begins, and the list of
+# wrong measured points, which are not used for verification.
 
 _EACH = 5
-"""One pose in this number is kept from the fit and verifies it."""
+"""One pose in this number is held out from the fit and verifies it."""
 _BLOCKS = 25
 """Number of blocks of successive readings of a moving platform."""
 LEAST_VERIFYING = 3
 """Least number of measured points that verify a calibration."""
 LEAST_POSES = _EACH * LEAST_VERIFYING
-"""With fewer poses, too few are kept for a verification."""
+"""With fewer poses, too few are held out for a verification."""
 
 
 def held_out(seen: Observations) -> BoolArray:
-    """Return which poses are kept from the fit, (N,).
+    """Return which poses are held out from the fit, (N,).
 
-    One in five, but at least three of those with a measured point if there are six or more, so
-    that the fit also keeps three. While the platform moves, one block of time in five.
+    One pose in five is held out, but at least three with a measured point if there are six or more,
+    so that three also remain for the fit. While the platform moves, one block of time in five is
+    held out.
     """
     if seen.time_s is not None:
         block = (np.arange(seen.poses) * (_BLOCKS / seen.poses)).astype(int)
@@ -267,15 +271,15 @@ def held_out(seen: Observations) -> BoolArray:
 
 
 def every_fifth(poses: int) -> BoolArray:
-    """Return which of `poses` poses are kept from the fit if all of them are measured, (N,)."""
+    """Return which of `poses` poses are held out if all of them are measured, (N,)."""
     return np.asarray(np.arange(poses) % _EACH == _EACH - 1)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A map of markers by the images of the used poses alone, independent of the cables.
+    """Marker map from images at the used poses alone, independent of the cables.
 
-    Only the sizes of sheets and the lens are results of the calibration.
+    It uses only the sizes of the sheets and the lens from the calibration.
     """
 
     setup: CameraSetup
@@ -286,14 +290,15 @@ class Reference:
 
 @dataclass(frozen=True)
 class Honesty:
-    """Errors of held-out positions against predicted ones; nan if no positions were measured."""
+    """Actual and predicted errors of held-out positions; nan if no positions were measured."""
 
     actual_mm: float
     """Root mean square of a coordinate's error."""
     predicted_mm: float
     """Standard deviation of a coordinate."""
     ratio: float
-    """Root mean square of errors over their standard deviations (Birge, Phys. Rev. 40, 1932)."""
+    """Root mean square of errors divided by their standard deviations (Birge, Phys. Rev. 40,
+    1932)."""
 
 
 @dataclass(frozen=True)
@@ -303,7 +308,8 @@ class Unused:
     index: IntArray
     """Indices of the held-out poses."""
     seen: Observations
-    """Observations there, without slack cables, with the jumps that the other poses determine."""
+    """Observations at the held-out poses, without slack cables, with the jumps that the other poses
+    determine."""
     part: Fit
     reference: Reference | None
     """Reference for poses that a camera saw; None without a camera."""
@@ -318,9 +324,9 @@ class Unused:
         return self._compared(self.part.geometry, self.jumps_m)
 
     def before(self, file: CableGeometry) -> Verification:
-        """Return the errors of the robot's file.
+        """Return the errors of the geometry in the robot's file.
 
-        Jumps are errors of the readings, not of the file, and are corrected here too. Otherwise
+        Jumps are errors of the readings, not of the file, so they are corrected here too. Otherwise
         lengths would contradict the file after the encoders began to count again.
         """
         return self._compared(file, self.jumps_m)
@@ -328,7 +334,8 @@ class Unused:
     def honesty(self) -> Honesty:
         """Return actual and predicted errors against measured points.
 
-        Predicted are the fit's uncertainty, that of lengths of one pose, and of the measurement.
+        The prediction includes the uncertainty of the fit, of the lengths at one pose, and of the
+        measurement.
         """
         part, seen = self.part, self.seen
         there = locate(part.geometry, seen.without_jumps(self.jumps_m))
@@ -348,8 +355,8 @@ class Unused:
     def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
         """Return the errors of poses by lengths alone with a geometry.
 
-        If the camera is the reference, its place on the platform and the place of its map in the
-        room are those that fit this geometry best at the used poses.
+        If the camera is the reference, its pose on the platform and the pose of its map in the room
+        are those that fit this geometry best at the used poses.
         """
         reference = self.reference
         if reference is None or verifies(self.seen):
@@ -387,7 +394,10 @@ def hold_out(
     some, _ = without_slack(geometry, seen.some(index), slack_N)
     jumps = tuple((cable, int((index < kept[pose]).sum())) for cable, pose in slipped)
     used = some.used.copy()
-    for cable, pose in slipped:  # the other poses do not show on which side of the jump these are
+    for (
+        cable,
+        pose,
+    ) in slipped:  # the other poses do not show whether these readings are before or after the jump
         used[(index > kept[pose - 1]) & (index < kept[pose]), cable] = False
     some = replace(some, jumps=(*some.jumps, *jumps), used=used)
     return Unused(index, some, part, _reference(part, images, held))
@@ -411,9 +421,9 @@ MORE = 10
 def with_more_poses(found: Fit, more: int = MORE) -> Fit:
     """Return a fit with the covariance that `more` further poses would leave.
 
-    Each is assumed to be as informative as the average so far: with N poses, covariance C and
-    prior covariance K, it becomes (K^-1 + (C^-1 - K^-1) (N + more) / N)^-1. In directions that only
-    the prior determines, more poses have no effect.
+    Each further pose is assumed to be as informative as the average so far. With N poses,
+    covariance C and prior covariance K, the new covariance is (K^-1 + (C^-1 - K^-1) (N + more) /
+    N)^-1. In directions that only the prior determines, more poses have no effect.
     """
     size, poses = found.geometry.size, found.seen.poses
     known = found.geometry.known_std()

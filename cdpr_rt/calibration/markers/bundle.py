@@ -1,7 +1,7 @@
 """Bundle adjustment: fit the map, the camera's poses and, on request, the lens to all corners.
 
-Levenberg's and Marquardt's method on normal equations from which the poses are eliminated. Corners
-that do not fit lose weight w = 1/(1 + (r/c)²), Cauchy's, whose width c follows the spread of the
+The method is that of Levenberg and Marquardt, on normal equations from which the poses are
+eliminated. Corners have Cauchy's weight w = 1/(1 + (r/c)²). Its width c follows the spread of the
 residuals as they shrink.
 """
 
@@ -36,11 +36,11 @@ class CornerTerms:
     """n markers in images: residuals of their corners, and blocks of derivatives."""
 
     residual: FloatArray
-    """Expected less seen corners, to the right and down, (n, 8)."""
+    """Expected minus seen corners, to the right and down, (n, 8)."""
     by_pose: FloatArray
-    """By the pose of the camera, or of the platform that carries it, (n, 8, 6)."""
+    """Derivatives by the pose of the camera, or of the platform that carries it, (n, 8, 6)."""
     by_shared: FloatArray
-    """By parameters that all images share, such as the lens, (n, 8, C)."""
+    """Derivatives by parameters that all images share, such as the lens, (n, 8, C)."""
     by_marker: FloatArray
     """(n, 8, 6)"""
 
@@ -50,7 +50,7 @@ class Views:
     """n markers of a map and the cameras that see them; a row is one marker in one image."""
 
     corners_m: FloatArray
-    """In the marker's frame, (n, 4, 3)."""
+    """Corners in the marker's frame, (n, 4, 3)."""
     corners_px: FloatArray
     """(n, 4, 2)."""
     marker_position_m: FloatArray
@@ -59,13 +59,13 @@ class Views:
     camera_rotation: FloatArray
 
     def _points(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return corners from markers' middles, from cameras, and in their frames, (n, 4, 3)."""
+        """Return corners (n, 4, 3) from marker centres, from cameras, and in camera frames."""
         turned = self.corners_m @ self.marker_rotation.transpose(0, 2, 1)
         away = turned + (self.marker_position_m - self.camera_position_m)[:, None]
         return turned, away, away @ self.camera_rotation
 
     def off_px(self, lens: FloatArray) -> FloatArray:
-        """Return expected less seen corners, (n, 4, 2); inf behind the camera."""
+        """Return expected minus seen corners, (n, 4, 2); inf behind the camera."""
         flat = self._points()[2].reshape(-1, 3)
         behind = flat[:, 2] < _NEAR_m
         safe = np.where(behind[:, None], (0.0, 0.0, 1.0), flat)
@@ -73,7 +73,7 @@ class Views:
         return expected.reshape(-1, 4, 2) - self.corners_px
 
     def terms(self, lens: FloatArray) -> CornerTerms:
-        """Return the terms in px; shared are the lens (9) and the sheets' relative size (1)."""
+        """Return the terms in px; shared parameters are the lens (9) and the sheets' size (1)."""
         n = len(self.corners_px)
         turned, away, points = self._points()
         expected, by_point, by_lens = project_with_derivatives(points.reshape(-1, 3), lens)
@@ -91,8 +91,8 @@ class Views:
         )
 
 
-# Normal equations in blocks: parameters, and poses, each coupled only to itself. Poses are
-# eliminated: S = H - Σ E_j C_j^-1 E_j^T (Schur).
+# Normal equations in blocks of parameters and poses. Each pose is coupled only to itself, so poses
+# are eliminated: S = H - Σ E_j C_j^-1 E_j^T (Schur).
 
 _WEAK, _SINGULAR = 1e-6, 1e-10
 
@@ -112,7 +112,7 @@ class PoseBlocks:
     by_pose: FloatArray
 
     def only(self, parameters: IntArray) -> PoseBlocks:
-        """Return the equations of some of the parameters, with all others held."""
+        """Return the equations of some of the parameters, with all others fixed."""
         H = self.H[np.ix_(parameters, parameters)]
         return replace(
             self, H=H, E=self.E[:, parameters], by_parameter=self.by_parameter[parameters]
@@ -152,7 +152,7 @@ class PoseBlocks:
 def corner_blocks(
     seen: SeenMarkers, terms: CornerTerms, weights: FloatArray, poses: int
 ) -> PoseBlocks:
-    """Return Σ J^T w J and Σ J^T w r; each marker in an image fills only a few of their blocks.
+    """Return Σ J^T w J and Σ J^T w r; each marker in an image contributes to few blocks only.
 
     The parameters are the shared ones, then 6 of each marker.
     """
@@ -179,7 +179,7 @@ def corner_blocks(
 
 
 def _sum(number: IntArray, count: int, blocks: FloatArray) -> FloatArray:
-    """Return the sums (count, ...) of blocks (n, ...) with the same number."""
+    """Return the sums (count, ...) of blocks (n, ...) that have the same `number`."""
     n = len(number)
     picks: Any = csr_array((np.ones(n), (number, np.arange(n))), shape=(count, n))
     return np.asarray(picks @ blocks.reshape(n, -1)).reshape(count, *blocks.shape[1:])
@@ -187,14 +187,14 @@ def _sum(number: IntArray, count: int, blocks: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A map together with the lens through which it is seen."""
+    """A map and the lens of the camera that sees it."""
 
     map: MarkerMap
     lens: FloatArray
 
     @property
     def parameters(self) -> int:
-        """Number of parameters besides the camera's poses: 9 of the lens, 6 of each marker."""
+        """Number of parameters without the camera's poses: 9 for the lens, 6 for each marker."""
         return LENS_PARAMETERS + 6 * len(self.map.ids)
 
     def changed(self, step: FloatArray, moves: FloatArray | None = None) -> Estimate:
@@ -231,14 +231,15 @@ class Estimate:
 
 
 # Errors of printed sheets, relative to squares of their nominal size, and a map's covariance with
-# them. Noise differs in each image; a sheet's errors (scale of the printer, paper that is not
-# flat) are the same in all. They do not average out, and a covariance that treats them as noise
-# is too small.
+# these errors. Noise differs in each image, but the errors of a sheet (scale of the printer, paper
+# that is not flat) are the same in all images. They do not average out, so a covariance that treats
+# them as noise is too small.
 
 _SEEN_SHARE, _NOISE_SHARE = 8.0 / 2.0, 5.0 / 2.0
-"""A sheet's errors have 8 coordinates at 4 corners. Seen from about one direction its pose absorbs
-6 of them, from many only 3: position and rotation in its plane. The first estimates the size of
-the errors, the second the share of noise alone: in both cases the larger value."""
+"""The errors of a sheet have 8 coordinates at 4 corners. If all images are from about one
+direction, its pose absorbs 6 of them. From many directions it absorbs only 3: position and rotation
+in the plane. The first number is used to estimate the size of the errors, the second to estimate
+the share of noise alone, so that both estimates are on the high side."""
 _SIGMAS = 3.0
 
 
@@ -249,15 +250,15 @@ class SheetErrors:
     sigma_m: float
     """Standard deviation of a coordinate of a corner on its sheet; 0 if not significant."""
     inflation: float
-    """Factor of the covariance over the one by noise alone: 1 + (n - 1) r for markers
-    that are seen in n images, with the correlation r of a corner's residuals (design effect)."""
+    """Ratio of the covariance to the one due to noise alone: 1 + (n - 1) r for markers that are
+    seen in n images, with the correlation r of a corner's residuals (design effect)."""
 
 
 def sheet_errors(estimate: Estimate, seen: SeenMarkers, weight: FloatArray) -> SheetErrors:
-    """Return the sheets' errors by an analysis of variance; `weight` (n, 4) is the fit's.
+    """Return the sheets' errors by an analysis of variance; `weight` (n, 4) is that of the fit.
 
-    With n images of a marker, the mean squares between corners and within them are at most
-    (n s² + 2.5 v) / 4 and v, where s² is the sheets' variance and v the noise's.
+    With n images of a marker, the mean squares between corners and within them are at most (n s² +
+    2.5 v) / 4 and v. Here s² is the variance of the sheets and v that of the noise.
     """
     terms, n = estimate.views(seen).terms(estimate.lens), len(seen)
     by_place = terms.by_marker[..., :3].reshape(n, 4, 2, 3)
@@ -294,12 +295,12 @@ _LEAST_SIGMA_px = 0.02
 _WIDTH = 3.0
 """Width of the loss, in standard deviations."""
 _LOSS_BIAS = 0.926
-"""Weighted standard deviation over the true one, of normal residuals: (9 (1 - w) / 2 w)^½ with the
-mean weight w = 4.5 e^4.5 E1(4.5) = 0.840. The standard deviation of the estimates, with weights in
-the normal matrix, is within 2 % without it."""
+"""Ratio of the weighted standard deviation to the true one, for normal residuals: (9 (1 - w) / 2
+w)^½ with the mean weight w = 4.5 e^4.5 E1(4.5) = 0.840. The standard deviations of the estimates
+need no such factor: with the weights in the normal matrix they are right within 2 %."""
 _MOST_DAMPING = 1e10
 NORMAL_MEDIAN = 1.1774
-"""Median of the length of a vector of two normal numbers of deviation 1."""
+"""Median length of a vector of two normal variables with standard deviation 1."""
 
 
 class BundleError(ControlError):
@@ -318,9 +319,9 @@ class Bundle:
     sigma_px: float
     """Standard deviation of a coordinate of a corner, from the weighted residuals."""
     covariance: FloatArray
-    """Covariance of the parameters of the estimate, (p, p), 0 for held ones."""
+    """Covariance of the parameters of the estimate, (p, p), 0 for fixed ones."""
     sheets: SheetErrors
-    """Errors of the sheets, which the covariance contains."""
+    """Errors of the sheets; the covariance includes them."""
 
     @property
     def rms_px(self) -> float:
@@ -343,9 +344,10 @@ class Bundle:
     def shape_sigma_m(self) -> FloatArray:
         """Standard deviations of the markers' positions, (m, 3), in the frame that fits all best.
 
-        The part of their covariance C that is left when the map may move and turn as a whole: P C P
-        with P = 1 - G (G^T G)^-1 G^T, G the positions' derivatives by the six rigid motions. In one
-        marker's frame, the uncertain tilt of its sheet would add in proportion to the distance.
+        They belong to the part of the covariance C that no rigid motion of the map explains: P C P
+        with P = 1 - G (G^T G)^-1 G^T, where G are the derivatives of the positions by the six rigid
+        motions. In the frame of a single marker, the uncertain tilt of its sheet would add errors
+        in proportion to the distance.
         """
         placed = np.flatnonzero(self.estimate.map.placed)
         at = self.estimate.map.position_m[placed]
@@ -363,12 +365,12 @@ class Bundle:
 def adjust(
     start: Estimate, seen: SeenMarkers, fixed: tuple[int, ...], *, free_lens: bool = False
 ) -> Bundle:
-    """Return the best fit from `start`; the markers with ids `fixed` are held as the gauge.
+    """Return the best fit from `start`; the markers with ids `fixed` do not move and fix the gauge.
 
     Raises BundleError if no marker is fixed, or if the images do not determine the rest.
     """
     usable = start.map.placed[seen.marker] & start.map.located[seen.image]
-    # the fit cannot bring a marker that starts behind the camera to the front
+    # the fit cannot move a marker from behind the camera to its front
     before_camera = np.isfinite(start.off_px(seen.keep(usable))).all(axis=(1, 2))
     usable[usable] = before_camera
     used = seen.keep(usable)
@@ -413,13 +415,13 @@ def _free_parameters(
 
 
 def _spread(off: FloatArray) -> float:
-    """Return the standard deviation of a coordinate, by the median of the distances."""
+    """Return the standard deviation of a coordinate from the median of the distances."""
     distance = np.linalg.norm(off, axis=-1)
     return max(float(np.median(distance)) / NORMAL_MEDIAN, _LEAST_SIGMA_px)
 
 
 def cauchy_weights(off: FloatArray, sigma: float) -> FloatArray:
-    """Return the weight of each corner, (n, 4), of residuals (n, 4, 2) with deviation `sigma`."""
+    """Return the weight (n, 4) of each corner for residuals (n, 4, 2) with deviation `sigma`."""
     return np.asarray(1.0 / (1.0 + (off**2).sum(axis=-1) / (_WIDTH * sigma) ** 2))
 
 

@@ -25,15 +25,15 @@ from cdpr_rt.errors import ControlError, InvalidRequestError
 # neighbouring parabolas are intersected.
 
 _POINTS = 48
-"""Along each edge."""
+"""Number of profiles along each edge."""
 _STEPS = 25
-"""Across it."""
+"""Number of points across it."""
 _ENDS = 0.07
 """Share of an edge, at each end, that is disturbed by the neighbouring edge."""
 _REACH = 0.42, 1.8, 7.0
-"""Across an edge: share of a square of the marker, least and most, px."""
+"""Length of a profile across an edge: share of a square of the marker, least and most px."""
 _LEAST_CONTRAST = 15.0
-"""Grey levels between ink and paper."""
+"""Least difference of grey levels between ink and paper."""
 _MOST_OFF_px = 0.8
 _LEAST_POINTS = 12
 _PASSES, _FITS = 2, 4
@@ -48,7 +48,8 @@ class EdgeFit:
     good: BoolArray
     """Whether all four edges were visible, (k,)."""
     width_px: FloatArray
-    """Width of the widest edge of each, from ink to paper, (k,): over its steepest slope."""
+    """Width of the widest edge of each marker, (k,): the step from ink to paper over its steepest
+    slope."""
 
 
 def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) -> EdgeFit:
@@ -62,7 +63,9 @@ def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) ->
         along = end - start
         length = np.maximum(np.linalg.norm(along, axis=2), 1e-6)
         along = along / length[..., None]
-        across = np.stack([along[..., 1], -along[..., 0]], axis=2)  # outward: they go clockwise
+        across = np.stack(
+            [along[..., 1], -along[..., 0]], axis=2
+        )  # outward, because the corners go clockwise
         share, least, most = _REACH
         reach = np.clip(share * length.min(axis=1) / squares, least, most)
         s = np.linspace(_ENDS, 1.0 - _ENDS, _POINTS)
@@ -81,7 +84,7 @@ def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) ->
 
 
 def _sampled(pixels: NDArray[np.uint8], grid: FloatArray) -> FloatArray:
-    """Return interpolated grey levels at places (..., 2)."""
+    """Return interpolated grey levels at positions (..., 2) in the image."""
     flat = grid.astype(np.float32).reshape(-1, _POINTS * _STEPS, 2)
     # in several parts: OpenCV takes no more than 32767 columns or rows
     levels = [
@@ -93,7 +96,7 @@ def _sampled(pixels: NDArray[np.uint8], grid: FloatArray) -> FloatArray:
 
 
 def _crossings(profile: FloatArray, offset: FloatArray) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Return where profiles (k, 4, points, steps) are half-way, whether, and each edge's width."""
+    """Return where profiles (k, 4, points, steps) cross half-way, whether they do, and widths."""
     quarter = _STEPS // 4
     ink = profile[..., :quarter].mean(axis=-1)
     paper = profile[..., -quarter:].mean(axis=-1)
@@ -157,14 +160,15 @@ def _intersections(
     return place
 
 
-# OpenCV's sets of markers by name, and which of them an image shows.
+# OpenCV's marker dictionaries by name, and detection of the one that an image shows.
 
 _LEAST_READ = 4
-"""Least number of ids that proves a dictionary: one or two of a large one are read by chance."""
+"""Least number of ids that proves a dictionary; one or two ids of a large one may be read by
+chance."""
 
 
 def opencv_dictionary(name: str) -> Any:
-    """Return OpenCV's set of this name, without its DICT_; raises InvalidRequestError."""
+    """Return OpenCV's dictionary of this name, without DICT_; raises InvalidRequestError."""
     number = getattr(cv2.aruco, f"DICT_{name}", None)
     if number is None:
         near = closest(name.upper().removeprefix("DICT_"), DICTIONARIES)
@@ -174,12 +178,12 @@ def opencv_dictionary(name: str) -> Any:
 
 
 def dictionary_shown(pixels: NDArray[np.uint8]) -> str | None:
-    """Return the dictionary with most ids in an image (height, width), the smallest of several.
+    """Return the dictionary with most ids in an image (height, width), the smallest if several tie.
 
-    None if the image shows fewer than four ids of each.
+    Returns None if the image shows fewer than four ids of each dictionary.
     """
     read = {name: _count(name, pixels) for name in DICTIONARIES}
-    best = max(read, key=lambda name: read[name])  # smaller sets of a kind stand first
+    best = max(read, key=lambda name: read[name])  # smaller dictionaries of a kind come first
     return best if read[best] >= _LEAST_READ else None
 
 
@@ -189,7 +193,7 @@ def _count(name: str, pixels: NDArray[np.uint8]) -> int:
 
 
 _DARK, _FLAT = 30.0, 12.0
-"""Grey levels: brightest value and contrast of an image below which nothing is visible."""
+"""Brightest grey level and contrast of an image below which nothing is visible."""
 _BRIGHT, _BURNT_SHARE = 250, 0.6
 _SOFT_SHARE = 0.12
 """Share of its contrast by which the steepest edges of an image must rise between pixels."""
@@ -197,7 +201,7 @@ _BLURRED_px = 6.0
 
 
 class MarkerDetector:
-    """Finds the markers of one dictionary, by OpenCV; corners by `fit_corners`."""
+    """Finds the markers of one dictionary with OpenCV, and their corners with `fit_corners`."""
 
     def __init__(self, dictionary: str) -> None:
         """Raise InvalidRequestError for a dictionary that OpenCV does not have."""
@@ -240,9 +244,9 @@ class MarkerDetector:
         return ([] if ids is None else [int(marker) for marker in ids.ravel()]), found
 
     def _mirrored(self, pixels: NDArray[np.uint8], read: FloatArray) -> tuple[int, ...]:
-        """Return ids read in the mirror image at places without a marker (m, 4, 2) in the image.
+        """Return ids found in the mirror image where the image itself has no marker (m, 4, 2).
 
-        A sheet that can be read both ways is not a mirror image.
+        A sheet that can be read in both images is not mirrored.
         """
         flipped = np.ascontiguousarray(pixels[:, ::-1])
         ids, corners = self._find(flipped)
@@ -273,7 +277,9 @@ def _sharpness_problem(pixels: NDArray[np.uint8], found: int, width_px: float) -
         return None
     if (pixels >= _BRIGHT).mean() > _BURNT_SHARE:
         return "overexposed: most of it is white"
-    smooth = cv2.GaussianBlur(pixels.astype(np.float32), (0, 0), 1.0)  # noise is no edge
+    smooth = cv2.GaussianBlur(
+        pixels.astype(np.float32), (0, 0), 1.0
+    )  # so that noise does not count as an edge
     slope = np.hypot(np.diff(smooth, axis=0)[:, :-1], np.diff(smooth, axis=1)[:-1])
     low, high = np.percentile(pixels, (1.0, 99.5))
     if np.percentile(slope, 99.8) < _SOFT_SHARE * (high - low):
@@ -281,18 +287,18 @@ def _sharpness_problem(pixels: NDArray[np.uint8], found: int, width_px: float) -
     return None
 
 
-# Intrinsics of a camera from images of a ChArUco board, and what such images still lack.
+# Intrinsics of a camera from images of a ChArUco board, and the views that are still missing.
 
 _LEAST_CORNERS, _LEAST_VIEWS, _ENOUGH_VIEWS = 8, 5, 15
 _LOOKED_AT = 3
-"""Number of images searched for the reason why no board was found."""
+"""Number of images examined for the reason why no board was found."""
 _CELLS = 4
 _ENOUGH_CELLS = 0.8
 _TILT_deg, _TILTED_VIEWS = 25.0, 5
 _DISTANCE_RATIO = 1.5
 _BAD_VIEW = 3.0
-"""Root mean square of a view over the median of all, above which the view is left out
-if it is also above _GOOD_rms_px."""
+"""A view is left out if its root mean square exceeds _GOOD_rms_px and this multiple of the median
+of all views."""
 _GOOD_FOCAL_SIGMA = 1e-3
 _GOOD_rms_px = 0.5
 
@@ -303,7 +309,7 @@ class CalibrationError(ControlError):
 
 @dataclass(frozen=True)
 class Board:
-    """A ChArUco board: squares counted along its width and height."""
+    """A ChArUco board, with numbers of squares along its width and height."""
 
     columns: int = 9
     rows: int = 6
@@ -312,7 +318,7 @@ class Board:
     dictionary: str = "5X5_100"
 
     def made(self) -> Any:
-        """Return OpenCV's board; raises InvalidRequestError."""
+        """Return the board as an OpenCV object; raises InvalidRequestError."""
         dictionary = opencv_dictionary(self.dictionary)
         if not 0.0 < self.marker_m < self.square_m:
             raise InvalidRequestError(
@@ -335,7 +341,7 @@ class Board:
 
 @dataclass(frozen=True)
 class IntrinsicsFit:
-    """Intrinsics, how good they are, and what further images should show."""
+    """Intrinsics, their quality, and the views that further images should show."""
 
     intrinsics: CameraIntrinsics
     used: tuple[str, ...]
@@ -435,7 +441,11 @@ def _why_none(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> 
 
 
 def _solved(views: Sequence[_View], size: tuple[int, int]) -> Any:
-    """Return total rms, matrix, distortion, turns, shifts, deviations and rms of each view."""
+    """Return OpenCV's calibration result for the views.
+
+    It contains total rms, camera matrix, distortion, rotations, translations, standard deviations,
+    and rms of each view.
+    """
     solve: Any = cv2.calibrateCameraExtended
     try:
         done = solve([view[1] for view in views], [view[2] for view in views], size, None, None)
@@ -448,7 +458,7 @@ def _solved(views: Sequence[_View], size: tuple[int, int]) -> Any:
 def _missing(
     views: Sequence[_View], turns: Any, shifts: Any, intrinsics: CameraIntrinsics
 ) -> list[str]:
-    """Return the views that are missing, without which some parameters are weak."""
+    """Return the missing views, without which some parameters are poorly determined."""
     missing = []
     if len(views) < _ENOUGH_VIEWS:
         missing.append(f"{len(views)} images; take {_ENOUGH_VIEWS} or more")

@@ -19,8 +19,8 @@ def camera_matrix(lens: FloatArray) -> FloatArray:
 
 
 def project(points: FloatArray, lens: FloatArray) -> FloatArray:
-    """Return the pixels (n, 2) at which points (n, 3) of the camera's frame are seen."""
-    # OpenCV always computes derivatives, too, which takes thirty times as long
+    """Return the pixels (n, 2) at which the camera sees points (n, 3) of its frame."""
+    # OpenCV would always compute derivatives too, which takes thirty times as long
     x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens
     s = x * x + y * y
@@ -41,7 +41,7 @@ def project_with_derivatives(
         return np.zeros((0, 2)), np.zeros((0, 2, 3)), np.zeros((0, 2, 9))
     matrix = camera_matrix(lens)
     pixels, derivatives = cv2.projectPoints(points, _NOT_MOVED, _NOT_MOVED, matrix, lens[4:])
-    # by a rotation and a shift of all points, then by the lens
+    # the columns are a rotation and a translation of all points, then the lens
     by = np.asarray(derivatives, float).reshape(n, 2, 15)
     return np.asarray(pixels, float).reshape(n, 2), by[..., 3:6], by[..., 6:]
 

@@ -1,4 +1,4 @@
-"""Make a marker map from images: leave out faulty markers and images, and judge the map."""
+"""Make a marker map from images: leave out faulty markers and images, and assess the map."""
 
 from __future__ import annotations
 
@@ -35,14 +35,15 @@ from cdpr_rt.calibration.markers.marker_map import (
 )
 from cdpr_rt.errors import ControlError, InvalidRequestError
 
-# Diagnosis of a map that fits badly: which marker, how, or whether it is the lens. Each image
-# that locates its camera by the other markers measures a marker independently. If these places
-# differ too much, the marker has another size than given, was moved (all images before some
-# instant agree, and all after it), or exists twice (time does not matter). If the corners do not
-# form a square of its size, at one place or at several, the marker is partly covered.
+# Diagnosis of a map that fits badly: which marker is wrong and how, or whether the lens is wrong.
+# If an image locates its camera by the other markers, it measures a marker independently. If these
+# measured positions differ too much, there are three explanations. The marker has another size than
+# given; it was moved (all images before some instant agree, and all after it); or it exists twice
+# (the order of images does not matter). If the corners do not form a square of the marker's size at
+# one position or several, the marker is partly covered.
 
 _BAD_SHARE = 0.25
-"""Share of a marker's images with misfits, above which the marker is examined."""
+"""A marker is examined if it misfits in more than this share of its images."""
 _BAD_SIGMAS = 6.0
 _LEAST_IMAGES = 3
 """Least number of good images of a partly covered marker for it to stay in the map."""
@@ -77,13 +78,13 @@ class Suspect:
 
 @dataclass(frozen=True)
 class LensSuspicion:
-    """Diagnosis of the intrinsics by the images."""
+    """Suspicion that the intrinsics are wrong, found from the images."""
 
     wrong: bool
     focal_change: float
-    """Relative, of the lens that fits best."""
+    """Relative change of the focal length with the lens that fits best."""
     rms_px: float
-    """With the lens that fits best."""
+    """Root mean square error with the lens that fits best."""
 
 
 def suspects(bundle: Bundle, seen: SeenMarkers) -> list[Suspect]:
@@ -99,7 +100,7 @@ def suspects(bundle: Bundle, seen: SeenMarkers) -> list[Suspect]:
 
 
 def _off(corners_px: FloatArray) -> FloatArray:
-    """Return the second smallest error of a marker's corners: one may be hidden."""
+    """Return the second smallest error of a marker's corners, because one corner may be hidden."""
     return np.asarray(np.sort(corners_px, axis=-1)[..., 1])
 
 
@@ -155,9 +156,9 @@ def _judged(
 
 
 def _each_place(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[FloatArray, float]:
-    """Return the middle of a marker from each image, (r, 3), and its uncertainty, m.
+    """Return the centre of a marker from each image, (r, 3), and its uncertainty, m.
 
-    In the marker's own plane, because an image measures places well in it.
+    Positions are in the marker's plane, in which an image measures accurately.
     """
     map_ = bundle.estimate.map
     number = seen.marker[rows[0]]
@@ -174,7 +175,7 @@ def _each_place(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[Floa
 
 
 def _two_places(place: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], float]:
-    """Return which places belong to the second of two groups, and the groups' distance, m."""
+    """Return which positions belong to the second of two groups, and their distance, m."""
     far = np.linalg.norm(place[:, None] - place[None], axis=2)
     i, j = np.unravel_index(np.argmax(far), far.shape)
     group = far[:, j] < far[:, i]
@@ -187,14 +188,14 @@ def _two_places(place: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.b
 
 
 def _looseness(place: FloatArray, split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Return the typical distance of the places from the middles of their groups, m."""
+    """Return the typical distance of positions from the middles of their groups, m."""
     groups = [one for one in (place[split], place[~split]) if len(one)]
     off = [np.linalg.norm(one - np.median(one, axis=0), axis=1) for one in groups]
     return float(np.median(np.concatenate(off)))
 
 
 def _best_cut(split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
-    """Return where to cut a row of two kinds, and how many are on the wrong side of the cut."""
+    """Return where to cut a sequence of two kinds, and how many are on the wrong side."""
     cuts = range(1, len(split))
     wrong = [int(split[:c].sum() + (~split[c:]).sum()) for c in cuts]
     wrong = [min(w, len(split) - w) for w in wrong]
@@ -203,7 +204,7 @@ def _best_cut(split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, i
 
 
 def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, float]:
-    """Return a marker's size over the nominal one, and its standard deviation, cameras fixed."""
+    """Return a marker's relative size and its standard deviation, with fixed cameras."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     terms = bundle.estimate.views(own).terms(bundle.estimate.lens)
     by_size = terms.by_shared[..., LENS_PARAMETERS:]
@@ -215,7 +216,7 @@ def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, flo
 
 
 def _stand(rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float) -> int:
-    """Return in how many images a marker fits, at one place or at several."""
+    """Return the number of images in which a marker fits, at one position or several."""
     if _fits_with(1.0, rows, bundle, seen, limit):
         return len(rows)
     second, apart = _two_places(_each_place(rows, bundle, seen)[0])
@@ -229,7 +230,7 @@ def _stand(rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float) -> i
 def _fits_with(
     size: float, rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float
 ) -> bool:
-    """Return whether a marker of this relative size fits anywhere, with the cameras fixed."""
+    """Return whether a marker of this relative size fits at any pose, with fixed cameras."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     sizes = own.size_m.copy()
     sizes[seen.marker[rows[0]]] *= size
@@ -250,9 +251,9 @@ def _fits_with(
 def lens_suspicion(bundle: Bundle, seen: SeenMarkers, fixed: tuple[int, ...]) -> LensSuspicion:
     """Return whether the images fit significantly better with another lens.
 
-    The change of fx, fy, cx, cy, k1, k2, p1, p2, k3 is weighed with its covariance. Also, the
-    fit must become visibly better, or the focal length must change by much more than its error:
-    sheets that are not flat also change the lens a little.
+    The change of fx, fy, cx, cy, k1, k2, p1, p2, k3 must be significant by its covariance. In
+    addition, the fit must become visibly better, or the focal length must change by much more than
+    its error: sheets that are not flat also change the lens a little.
     """
     given = bundle.estimate.lens
     try:
@@ -270,9 +271,9 @@ def lens_suspicion(bundle: Bundle, seen: SeenMarkers, fixed: tuple[int, ...]) ->
     return LensSuspicion(wrong, focal, free.rms_px)
 
 
-# The two poses of a square that is seen at four corners. A distant square looks almost the same
-# when it is tilted the other way round. Both are needed: other images, or other markers of the
-# same image, decide between them.
+# The two poses of a square from its four corners. A distant square looks almost the same if it is
+# tilted in the opposite direction (flip). Both poses are kept until other images, or other markers
+# in the same image, decide between them.
 
 
 @dataclass(frozen=True)
@@ -282,15 +283,15 @@ class SquarePoses:
     rotation: FloatArray
     """(n, 2, 3, 3)."""
     position_m: FloatArray
-    """(n, 2, 3), of their middles."""
+    """Positions of their centres, (n, 2, 3)."""
     error_px: FloatArray
-    """(n, 2), root of the mean square distance of corners."""
+    """Root mean square distance of corners, (n, 2)."""
 
 
 def square_poses(seen: SeenMarkers, lens: FloatArray) -> SquarePoses:
     """Return the poses of all seen squares.
 
-    By infinitesimal plane-based pose estimation (Collins and Bartoli 2014).
+    The method is infinitesimal plane-based pose estimation (Collins and Bartoli 2014).
     """
     import cv2  # noqa: PLC0415  # needs an extra
 
@@ -305,17 +306,18 @@ def square_poses(seen: SeenMarkers, lens: FloatArray) -> SquarePoses:
     return SquarePoses(exponentials(vectors).reshape(n, 2, 3, 3), places, errors)
 
 
-# A first map: relative poses of markers on which images agree, then along a tree of markers.
-# Each image shows each marker in one of two poses, so that two markers have four possible
+# A first map: find relative poses of markers on which images agree, then place markers along a
+# tree. Each image shows each marker in one of two poses, so that two markers have four possible
 # relative poses. Only one of the four is the same in all images that show both.
 
 _MOST_IMAGES = 24
 """Number of images that are compared for a pair of markers."""
 _SAME_rad = 0.12
 _SAME_SHARE = 0.08
-"""Two measurements agree within this angle and this share of the distance of the two markers."""
+"""Two measurements of a relative pose agree if they differ by less than this angle and this share
+of the distance of the two markers."""
 _EDGE_COST = 0.05
-"""Cost of one more step in the tree, compared with that of few images."""
+"""Cost of one more step in the tree, in the units of the cost of a pair with few images."""
 
 
 @dataclass(frozen=True)
@@ -332,7 +334,7 @@ class Pair:
 
     @property
     def cost(self) -> float:
-        """Cost of a step along it: small if many images agree and few do not."""
+        """Cost of a step along this pair: small if many images agree and few do not."""
         return _EDGE_COST + (self.of / self.images) ** 2 / self.images
 
 
@@ -352,7 +354,7 @@ def marker_pairs(seen: SeenMarkers, poses: SquarePoses) -> list[Pair]:
 
 
 def _consent(a: int, b: int, rows: IntArray, poses: SquarePoses) -> Pair:
-    """Return the relative pose on which most images agree, of four for each image."""
+    """Return the relative pose on which most images agree; each image proposes four."""
     Ra, Rb = poses.rotation[rows[:, 0]], poses.rotation[rows[:, 1]]
     ta, tb = poses.position_m[rows[:, 0]], poses.position_m[rows[:, 1]]
     back = Ra.transpose(0, 1, 3, 2)
@@ -365,7 +367,7 @@ def _consent(a: int, b: int, rows: IntArray, poses: SquarePoses) -> Pair:
     shifted = np.linalg.norm(t[:, None] - t[None], axis=2)
     agrees = (turned < _SAME_rad) & (shifted < reach)
     votes = np.array([len(set(image[line])) for line in agrees])
-    # of poses with as many votes take the one that fits best
+    # if several poses have the most votes, take the one that fits best
     worth = votes - error / (error.max() + 1e-300) / 2.0
     best = int(np.argmax(worth))
     with_it = np.flatnonzero(agrees[best])
@@ -376,8 +378,8 @@ def _consent(a: int, b: int, rows: IntArray, poses: SquarePoses) -> Pair:
 def placed_along_tree(pairs: list[Pair], count: int, start: int) -> tuple[FloatArray, FloatArray]:
     """Return positions (m, 3) and rotations (m, 3, 3) in the frame of marker number `start`.
 
-    It follows the cheapest paths from there; a pair costs less if more images agree on it.
-    Markers without a path have nan.
+    The poses follow the cheapest paths from that marker. A pair costs less if more images agree on
+    it. Poses are nan for markers without a path.
     """
     position, rotation = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     position[start], rotation[start] = 0.0, np.eye(3)
@@ -413,8 +415,8 @@ def located_cameras(
 ) -> tuple[FloatArray, FloatArray]:
     """Return positions (k, 3) and rotations (k, 3, 3) of the camera in the images.
 
-    Each placed marker of an image proposes two poses; the one with the least median error of all
-    markers is taken. Images without a placed marker have nan.
+    Each placed marker of an image proposes two poses of the camera. The one with the least median
+    error over all markers is used. Poses are nan for images without a placed marker.
     """
     count = len(seen.names)
     places, turns = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
@@ -429,7 +431,7 @@ def located_cameras(
         proposed, where = proposed.reshape(-1, 3, 3), where.reshape(-1, 3)
         in_room = corners[rows] @ rotation[marker].transpose(0, 2, 1) + position[marker][:, None]
         expected = (in_room.reshape(1, -1, 3) - where[:, None]) @ proposed
-        # how the markers look from here, by their own better pose
+        # rotations of the markers as seen from this camera, by the better of their two poses
         own = corners[rows] @ poses.rotation[rows, 0].transpose(0, 2, 1)
         own = (own + poses.position_m[rows, 0][:, None]).reshape(1, -1, 3)
         z = np.where(expected[..., 2:] > 1e-6, expected[..., 2:], np.nan)
@@ -469,26 +471,27 @@ _GOOD_px, _POOR_px = 0.35, 1.5
 _SCALE_OFF = 0.004
 _FRAME_RATIO = 2.0
 _MIRRORED_IMAGES = 2
-"""Of a marker that is also read correctly: one image may mirror another marker by chance."""
+"""Least number of mirrored readings of a marker that is also read correctly: one mirrored reading
+may be chance."""
 _KNOWN_STD_m = 0.001
-"""Default standard deviation of each coordinate of a known place."""
+"""Default standard deviation of each coordinate of a known position."""
 _MISFIT_WEIGHT, _MISFIT_SHARE = 0.05, 0.05
-"""Weight of a corner that is 13 standard deviations off."""
+"""Weight of a corner with an error of 13 standard deviations."""
 
 
 @dataclass(frozen=True)
 class KnownFit:
-    """Agreement of a map with known places of markers that it does not use."""
+    """Agreement of a map with known marker poses that it does not use."""
 
     scale: float
-    """Distances in the layout over those of the map."""
+    """Ratio of the distances in the layout to those in the map."""
     rms_m: float
-    """Remaining differences after fitting position, rotation and scale."""
+    """Differences that remain after fitting position, rotation and scale."""
 
 
 @dataclass(frozen=True)
 class MapFit:
-    """A map, its quality, and the faults found on the way."""
+    """A map, its quality, and the faults found while it was made."""
 
     bundle: Bundle
     seen: SeenMarkers
@@ -520,9 +523,10 @@ def fit_map(
 ) -> MapFit:
     """Return the map that the sightings, in the order in which they were taken, determine.
 
-    Without known places it is in the frame of the marker `reference`, by default the one on which
-    images agree most; with them in that of the layout, whose known markers are held. Raises
-    InvalidRequestError if no image shows two markers, BundleError if the images determine nothing.
+    Without known marker poses, the map is in the frame of the marker `reference`, by default the
+    one on which images agree most. With known poses, it is in the frame of the layout, and known
+    markers do not move. Raises InvalidRequestError if no image shows two markers, BundleError if
+    the images determine nothing.
     """
     cover = coverage(sightings, sheets.placed)
     sightings = laid_out(sightings, sheets.placed)
@@ -576,7 +580,9 @@ def _without_suspects(
         first = first_map(seen, square_poses(seen, lens), reference)
         bundle = adjust(Estimate(first, lens), seen, (first.reference,))
         found = suspects(bundle, seen)
-        if not found or 2 * len(found) > len(seen.ids):  # so many misfits are no fault of markers
+        if not found or 2 * len(found) > len(
+            seen.ids
+        ):  # so many misfits have another cause than single markers
             break
         dropped += found
         for one in found:
@@ -587,7 +593,7 @@ def _without_suspects(
 
 
 def _compare(map_: MarkerMap, sheets: MarkerSheets) -> KnownFit | None:
-    """Return how well the map agrees with known places; None with fewer than two of them."""
+    """Return how well the map agrees with known marker poses; None if there are fewer than two."""
     if len(known_places(map_, sheets)[0]) < 2:
         return None
     moved, numbers, places, _ = aligned(map_, sheets)
@@ -599,7 +605,7 @@ def _compare(map_: MarkerMap, sheets: MarkerSheets) -> KnownFit | None:
 
 
 def _held(bundle: Bundle, seen: SeenMarkers, sheets: MarkerSheets) -> Bundle:
-    """Return the fit with the known markers held at their places."""
+    """Return the fit with the known markers fixed at their poses."""
     moved, numbers, places, turns = aligned(bundle.estimate.map, sheets)
     moved.position_m[numbers] = places
     moved.rotation[numbers] = turns
@@ -650,7 +656,7 @@ def _faults(cover: Coverage, lens: LensSuspicion, known: KnownFit | None) -> lis
 
 
 def misfits(bundle: Bundle) -> list[str]:
-    """Return a fault if many corners do not fit, whichever markers they belong to."""
+    """Return a fault if many corners do not fit, regardless of their markers."""
     seen = np.isfinite(bundle.off_px)
     share = 1.0 - float((bundle.weight[seen] > _MISFIT_WEIGHT).mean())
     if share <= _MISFIT_SHARE:

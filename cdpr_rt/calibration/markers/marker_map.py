@@ -1,4 +1,4 @@
-"""Marker maps: seen markers, poses of markers and camera, coverage, and known places."""
+"""Marker maps: seen markers, poses of markers and camera, coverage, and known marker poses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class SeenMarkers:
     marker: IntArray
     corners_px: FloatArray
     size_m: FloatArray
-    """Of each marker in `ids`, (m,)."""
+    """Size of each marker in `ids`, (m,)."""
 
     @classmethod
     def of(
@@ -45,7 +45,7 @@ class SeenMarkers:
         seen: Iterable[tuple[int, int, FloatArray]],
         size_m: Mapping[int, float],
     ) -> Self:
-        """Return seen markers from tuples (number of the image, id, corners (4, 2)).
+        """Return seen markers from tuples (index of the image, id, corners (4, 2)).
 
         Raises InvalidRequestError if a marker is twice in an image, or has no size.
         """
@@ -76,7 +76,7 @@ class SeenMarkers:
         return np.asarray(CORNERS * self.size_m[self.marker][:, None, None])
 
     def keep(self, kept: BoolArray) -> SeenMarkers:
-        """Return only those of `kept` (n,); names and ids do not change."""
+        """Return only the seen markers with `kept` (n,) true; names and ids do not change."""
         return replace(
             self,
             image=self.image[kept],
@@ -97,8 +97,8 @@ class SeenMarkers:
 class MarkerMap:
     """Poses of m markers and of the camera in k images, all in the frame of the map.
 
-    That is the frame of the marker `reference`, or of the layout if markers of known places
-    were given. A marker or image without a place has nan.
+    The frame is that of the marker `reference`, or of the layout if known marker poses were given.
+    Markers and images without a pose have nan.
     """
 
     ids: tuple[int, ...]
@@ -106,24 +106,24 @@ class MarkerMap:
     size_m: FloatArray
     """(m,)."""
     position_m: FloatArray
-    """Of the markers' middles, (m, 3)."""
+    """Positions of the markers' centres, (m, 3)."""
     rotation: FloatArray
-    """From a marker's frame to the map's, (m, 3, 3)."""
+    """Rotations from a marker's frame to the map's, (m, 3, 3)."""
     names: tuple[str, ...]
-    """Of the images."""
+    """Names of the images."""
     camera_position_m: FloatArray
     """(k, 3)."""
     camera_rotation: FloatArray
-    """From the camera's frame to the map's, (k, 3, 3)."""
+    """Rotations from the camera's frame to the map's, (k, 3, 3)."""
 
     @property
     def placed(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether each marker has a place, (m,)."""
+        """Whether each marker has a pose in the map, (m,)."""
         return np.isfinite(self.position_m[:, 0])
 
     @property
     def located(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether the camera has a place in each image, (k,)."""
+        """Whether the camera has a pose in each image, (k,)."""
         return np.isfinite(self.camera_position_m[:, 0])
 
     def corners_m(self) -> FloatArray:
@@ -152,7 +152,7 @@ def best_fit(points: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatA
     return turn, other - turn @ middle
 
 
-# Markers detected in one image, as detectors return them and data files hold them.
+# Markers detected in one image, in the form of detectors and data files.
 
 
 @dataclass(frozen=True)
@@ -167,15 +167,15 @@ class Sighting:
     unsharp: tuple[int, ...] = ()
     """Ids whose edges are hidden or blurred."""
     mirrored: tuple[int, ...] = ()
-    """Ids that appear only in its mirror image."""
+    """Ids that appear only in the mirror image."""
     problem: str | None = None
-    """Fault of the image as a whole, as text; None if it has none."""
+    """Fault of the image as a whole, as text, or None."""
 
 
 def laid_out(sightings: Sequence[Sighting], placed: Collection[int]) -> list[Sighting]:
-    """Return sightings without ids that are not laid out; unchanged if none are given.
+    """Return sightings without ids that were not laid out; unchanged if `placed` is empty.
 
-    A chessboard or a poster may look like a marker, just as sharp and without a wrong bit.
+    A chessboard or a poster may look like a marker, with sharp edges and no wrong bit.
     """
     if not placed:
         return list(sightings)
@@ -195,9 +195,8 @@ def laid_out(sightings: Sequence[Sighting], placed: Collection[int]) -> list[Sig
     ]
 
 
-# Whether the images taken so far can become one map, and what to do if not. Only the markers
-# that each image shows matter, as section 3.7.3 of the thesis does for the share of the markers
-# seen.
+# Whether the images taken so far can become one map, and what to do otherwise. This depends only on
+# the ids in each image, as does the share of seen markers in section 3.7.3 of the thesis.
 
 _FEW_IMAGES = 3
 _LISTED = 12
@@ -209,21 +208,21 @@ class Coverage:
 
     images: int
     ids: tuple[int, ...]
-    """All seen markers; only those laid out, if these are known."""
+    """All seen markers, or only those that were laid out if their ids are known."""
     islands: tuple[tuple[int, ...], ...]
     """Markers connected by images that show several of them, the largest island first."""
     share_seen: float | None
-    """Of the markers laid out, if their ids are known."""
+    """Share of the laid-out markers that were seen, if their ids are known."""
     unseen: tuple[int, ...]
     seldom: tuple[int, ...]
-    """Seen in fewer than three images."""
+    """Markers seen in fewer than three images."""
     advice: tuple[str, ...]
 
     @property
     def apart(self) -> list[tuple[int, ...]]:
-        """Islands besides the largest, without uncertain ones.
+        """Islands other than the largest, without uncertain markers.
 
-        Those were seen in one image or two.
+        A marker is uncertain if only one or two images show it.
         """
         return [one for one in self.islands[1:] if set(one) - set(self.seldom)]
 
@@ -328,13 +327,14 @@ def listed(ids: Sequence[int]) -> str:
     return f"marker{'s' if len(ids) != 1 else ''} {shown}{more}"
 
 
-# Markers whose place is known: the frame that they give a map, and places that contradict it. The
-# map by images alone tests a place. Two known markers give a map its frame and scale; the two
-# with which most others agree decide. If exchanging the places of two markers makes them agree,
-# these two were exchanged.
+# Markers with known poses: the frame that they give to a map, and poses that contradict it. A map
+# from images alone is the test. Two known markers determine its frame and scale; the pair with
+# which most others agree is used. If two markers agree after their poses are exchanged, they were
+# exchanged in the file.
 
 _SIGMAS, _SIZES = 6.0, 0.3
-"""Distance above which a place contradicts others: standard deviations, and sizes of a sheet."""
+"""Distance above which a known position contradicts others: in standard deviations, and in sizes of
+a sheet."""
 _TURN_rad = 0.35
 _SCALES = (0.9, 1.1)
 _ALL_PAIRS = 10
@@ -343,17 +343,17 @@ _ALL_PAIRS = 10
 
 @dataclass(frozen=True)
 class KnownPlaces:
-    """Consistent places, and the faults of the others."""
+    """Consistent marker poses, and the faults of the others."""
 
     sheets: MarkerSheets
-    """With consistent places only."""
+    """The sheets, with consistent poses only."""
     faults: tuple[str, ...]
     contradictory: bool = False
-    """Whether no majority of the places is consistent; then none is kept."""
+    """Whether no majority of the poses is consistent; then no pose is kept."""
 
 
 def known_places(map_: MarkerMap, sheets: MarkerSheets) -> tuple[list[int], FloatArray, FloatArray]:
-    """Return numbers in the map, positions and rotations of known markers that have a place."""
+    """Return indices in the map, positions and rotations of known markers that the map contains."""
     known = [
         one for one in sheets.known if one.id in map_.ids and map_.placed[map_.ids.index(one.id)]
     ]
@@ -368,7 +368,7 @@ def aligned(
 ) -> tuple[MarkerMap, list[int], FloatArray, FloatArray]:
     """Return the map moved to the known markers, and the results of `known_places`.
 
-    Their corners are matched by least squares; the map keeps its size.
+    The corners of these markers are matched by least squares; the map keeps its scale.
     """
     numbers, places, turns = known_places(map_, sheets)
     corners = map_.corners_m()[numbers]
@@ -379,9 +379,9 @@ def aligned(
 
 
 def consistent_places(map_: MarkerMap, sheets: MarkerSheets, std_m: float) -> KnownPlaces:
-    """Return the known places that agree with a map, whatever its frame and its scale.
+    """Return the known marker poses that agree with a map, in any frame and scale.
 
-    `std_m` is the standard deviation of each coordinate of a known place.
+    `std_m` is the standard deviation of each coordinate of a known position.
     """
     layout = _Layout.of(map_, sheets, std_m)
     count = len(layout.places)
@@ -421,7 +421,7 @@ def _without(sheets: MarkerSheets, ids: Sequence[int]) -> MarkerSheets:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Known markers in the map, and their places by the file."""
+    """Known markers in the map, and their poses in the file."""
 
     ids: tuple[int, ...]
     map_m: FloatArray
@@ -432,7 +432,7 @@ class _Layout:
     places: FloatArray
     turns: FloatArray
     limit_m: FloatArray
-    """Distance above which a place contradicts, (m,)."""
+    """Distance above which a marker contradicts others, (m,)."""
 
     @classmethod
     def of(cls, map_: MarkerMap, sheets: MarkerSheets, std_m: float) -> _Layout:
@@ -444,7 +444,7 @@ class _Layout:
         return cls(ids, corners, map_.rotation[numbers], flat, places, turns, limit)
 
     def agreeing(self, order: IntArray) -> BoolArray:
-        """Return the largest set of markers that agree, (m,), with their places in this order.
+        """Return the largest set of markers that agree, (m,), with the given poses in this order.
 
         A single marker always agrees.
         """
@@ -467,7 +467,7 @@ class _Layout:
             yield i, int(np.linalg.norm(self.places - place, axis=1).argmax())
 
     def _with_frame_of(self, pair: list[int], order: IntArray) -> BoolArray:
-        """Return which markers agree in the frame and scale of two of them, (m,)."""
+        """Return which markers agree if two of them determine frame and scale, (m,)."""
         places, turns = self.places[order], self.turns[order]
         middles = self.map_m.mean(axis=1)
         told_m, seen_m = (float(np.linalg.norm(p[pair[0]] - p[pair[1]])) for p in (places, middles))
@@ -482,7 +482,7 @@ class _Layout:
 
 
 def _exchange(layout: _Layout, order: IntArray, good: BoolArray) -> tuple[int, int] | None:
-    """Return the exchange of two places after which these and most others agree."""
+    """Return the exchange of two poses after which these two and most others agree."""
     doubted = np.flatnonzero(~good) if good.sum() > 2 else np.arange(len(order))
     if len(doubted) > _ALL_PAIRS:
         return None
