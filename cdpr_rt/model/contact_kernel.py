@@ -17,8 +17,8 @@ formula the acceleration is at most |TURN|² |b|.
 
     ends    (2, n, 3)    where the free part of each cable begins (at its exit point or the tangent
                          of its pulley) and where it ends, in the room
-    points (4, 3) ends of the segments of a pair, without the parts that are left out near (2, 3)
-    the nearest points of the pair
+    points  (4, 3)       ends of the segments of a pair, without the parts that are left out
+    near    (2, 3)       the nearest points of the pair
 
 Next to a point that a cable shares with the other thing, `least` metres of it are left out, but at
 most half of the cable. The bits EXIT and ANCHOR of TRIMMED mark the ends at which this is done.

@@ -5,7 +5,7 @@ least squares, with
 
     lengths       ρ_i(pose) = l_i        standard deviation LENGTH_STD_m
     equilibrium   -J^T t + weight = 0    FORCE_SHARE of the weight, CENTRE_STD_m times the weight
-    tensions t_i = s_i s_i is the reading of motors or load cells, see `say_tensions`
+    tensions      t_i = s_i              s_i is that of motors or load cells, see `say_tensions`
     inclinometer  Q s = (0, 0, 1)        TILT_STD_rad; s is its upward direction
 
 Without load cells, the tensions add little: mainly how far cables pull against each other, which
