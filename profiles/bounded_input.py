@@ -139,7 +139,7 @@ def parse_json(text: str | bytes, source: Path | str) -> Any:
 
 
 def is_mostly_text(data: bytes, most_strings: int, most_other: int) -> bool:
-    """Return whether a JSON text has at most so many strings, and so many bytes outside them.
+    """Return whether a JSON text has at most these numbers of strings and of bytes outside them.
 
     Such a text is quick to parse and validate, even if its strings are long.
     """

@@ -447,7 +447,7 @@ def _inertia_faults(
 def _direction_faults(
     file: PlatformFile, anchors: Sequence[tuple[float, ...]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield faults of the controlled directions: beyond the cables' control, or missing values."""
+    """Yield faults of the controlled directions: not controllable by the cables, or no values."""
     size, n = len(file.home_m), len(anchors)
     known = DIRECTIONS[size]
     given = controlled_by_default(anchors) if file.controlled is None else file.controlled

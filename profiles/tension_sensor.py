@@ -41,7 +41,7 @@ class AngleValue(RawValue):
     """Location of a measured angle: rad = raw value × scale - zero."""
 
     scale_rad: float = Field(ge=-1.0, le=1.0)
-    """Negative if the sensor counts in the opposite direction."""
+    """Scale; negative if the sensor counts in the opposite direction."""
     zero_rad: float = Field(default=0.0, ge=-1.0, le=1.0)
 
     @model_validator(mode="after")
@@ -87,7 +87,7 @@ class TareMap(Profile):
     address: Address
     value: int = Field(default=1, ge=0, le=0xFFFF)
     settle_s: float = Field(default=0.5, ge=0, le=60)
-    """Time that the amplifier needs for it."""
+    """Time that the amplifier needs to tare."""
 
 
 class Amplifier(Profile):

@@ -402,7 +402,7 @@ class AnswerWait:
             self._clock.sleep_until(until_s)
 
     def learn(self, took_s: float, too_early: bool) -> None:
-        """Adapt to the time of the last answer; `too_early` if the sleep ended before it."""
+        """Adapt the sleep to the time of the last answer, and to whether it ended too early."""
         if too_early:
             took_s = min(took_s, self._most_s)
             self._expected_s += _RISE * (took_s - self._expected_s)

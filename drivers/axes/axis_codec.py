@@ -98,7 +98,7 @@ _CYCLE_OVER = 1 << 62
 """Bit of TPDOS_RECEIVED that is set from the end of a cycle until the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
-"""Limits of the share of cycles without exactly one answer: the rate is bad; the loop trips."""
+"""Largest share of cycles without exactly one answer: for a good rate; before the loop trips."""
 _MOST_EXTRA_FRAMES = 400
 
 

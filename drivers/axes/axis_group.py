@@ -522,9 +522,9 @@ class AxisGroup:
     def ask_mode(self, modes: int | Sequence[int]) -> None:
         """Request a mode of operation, one for all axes or one each.
 
-        `mode_confirmed` reports when they have it. Raises ModeRefusedError if an axis is enabled
-        or lacks its mode; then nothing has changed. Raises it with the drive's reason if a drive
-        refuses; then no axis can be enabled until a mode is requested again.
+        `mode_confirmed` reports when they have it. If an axis is enabled or lacks its mode, raises
+        ModeRefusedError and changes nothing. If a drive refuses, raises it with the drive's reason;
+        no axis can then be enabled until a mode is requested again.
         """
         requested = [modes] * self.n if isinstance(modes, int) else list(modes)
         for i, (axis, mode) in enumerate(zip(self.axes, requested, strict=True)):

@@ -305,7 +305,7 @@ class SimulatedBusClock(LockstepClock):
             time.sleep(_LOST_S)
 
     def close(self) -> None:
-        """Stop leading in order; if this process just died, bus time would run with wall time."""
+        """Stop leading properly; if this process just ended, bus time would follow wall time."""
         super().close()
         self.sleep(_LAST_S)
         for bus in self._by_url.values():

@@ -14,7 +14,7 @@ _STREAMS = ("rtsp://", "rtsps://", "rtmp://", "udp://", "rtp://")
 _STALE = 4
 """Maximum number of old images that may wait in a V4L2 device."""
 _FRESH_S, _MOST_STALE = 0.005, 200
-"""An image for which a stream needs longer than this is new; maximum number of older images."""
+"""Delay after which a delivered image is new; maximum number of older images to skip."""
 
 
 class OpencvCamera(Camera):

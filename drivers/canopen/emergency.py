@@ -88,7 +88,7 @@ class EmergencyLog:
         self._recent: dict[int, tuple[float, int]] = {}
 
     def add(self, emergency: Emergency) -> str:
-        """Store a message; in a flood, return their number and the last one as text, else ""."""
+        """Store a message; in a flood, return the number of messages and the last one, else ""."""
         self.kept.append(emergency)
         standing = self._standing.setdefault(emergency.node_id, {})
         if not emergency.is_reset:

@@ -113,7 +113,7 @@ class LssMaster(BusMember):
     """LSS on one bus; a context manager that leaves every device in the waiting state.
 
     `timeout_s` is the longest time that a device may take to answer. It also determines the
-    duration of a search, because fastscan asks bit by bit and no answer is a valid answer. Raises
+    duration of a search, because fastscan asks bit by bit and silence is a valid answer. Raises
     BusError if the bus cannot be opened, or is lost later.
     """
 

@@ -241,7 +241,7 @@ def _keep_asking(clock: Clock, watches: Sequence[PowerWatch]) -> None:
 def slack_watch(
     rail: RailProfile, sensors: str | None, port: str | None, checked: bool, clock: Clock
 ) -> Iterator[Callable[[], str]]:
-    """Yield a function that returns which cable is tight, "" if none; by load cells or `checked`.
+    """Yield a function that returns which cable is tight; "" if load cells show none or `checked`.
 
     Raises ConfigurationError if neither is given, ModbusError if load cells do not answer.
     """

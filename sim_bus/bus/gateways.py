@@ -76,7 +76,7 @@ def report(message: dict[str, Any]) -> None:
 
 
 class Gateway:
-    """A gateway process that ends with the simulator; killing it unplugs it."""
+    """A gateway process that ends with the simulator; to unplug the gateway, kill the process."""
 
     def __init__(self, *arguments: str) -> None:
         """Start the process with these arguments and wait until it is ready.

@@ -351,7 +351,7 @@ class ObjectDictionary:
 
 
 def _default_count(record: ODRecord | ODArray) -> int:
-    """Return the count of a record without one in the EDS; PDO maps count entries with default."""
+    """Return the count if the EDS has none; in a PDO map, only entries with defaults count."""
     mapped = 0
     if record.index not in _MAPPINGS:
         return int(max(record.subindices))

@@ -229,7 +229,7 @@ def lengthen_cable(motor: MotorArray, metres: float) -> None:
 
 
 def mend_cable(motor: MotorArray, load: LoadPlant, slipped_m: float) -> None:
-    """Attach the cable of a motor that belongs to no robot again, and undo its slip.
+    """Reattach the cable of a motor that belongs to no robot, and undo its slip.
 
     If that would pull the load, the cable is just slack instead. A tight cable stays as it is.
     """

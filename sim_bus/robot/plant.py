@@ -187,7 +187,7 @@ class LimitsPlant(Profile):
     """Positive limit switch: active above this angle."""
     home_from_deg: _Angle_deg | None = None
     home_to_deg: _Angle_deg | None = None
-    """Home switch: active between the two angles, or on the whole side of the only one."""
+    """Home switch: active between the two angles; with only one, on the whole side beyond it."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

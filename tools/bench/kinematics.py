@@ -1,4 +1,4 @@
-"""Measure the cost of a pose from cable lengths, and how far off its start may be; and SciPy's."""
+"""Compare with SciPy: cost of a pose from cable lengths, and allowed error of its start."""
 
 from __future__ import annotations
 

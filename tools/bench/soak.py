@@ -135,7 +135,7 @@ class Soak:
     def run(
         self, seconds: float, advance: Callable[[float], None], most_wall_s: float = math.inf
     ) -> None:
-        """Move for `seconds` of bus time, or to the end of the leg after `most_wall_s`.
+        """Move for `seconds` of bus time; after `most_wall_s`, end with the present leg.
 
         Raises WorkFailedError if the motion ends early.
         """

@@ -73,7 +73,7 @@ class NodeInfo:
     answered: defaultdict[bytes, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     """The answers to these requests, from any device."""
     is_shared: bool = False
-    """Whether another client makes transfers with the node and may be meant by its answers."""
+    """Whether another client also makes transfers with the node, so answers may be for it."""
 
     @property
     def repeated(self) -> set[bytes]:

@@ -331,7 +331,7 @@ def require_points_of(poses: int, path: Path) -> None:
 
     Also raises ProfileError.
 
-    They were measured at poses of an earlier run, whose data are no longer in the folder.
+    Such points were measured at poses of an earlier run, whose data are no longer in the folder.
     """
     if not path.exists():
         return

@@ -36,8 +36,8 @@ class Places:
     """Places (m, d), the most informative first, and the place from which they are reached."""
 
     middle: FloatArray
-    """(d,); from here to the chosen places and back, there is no contact and the cables can hold
-    the platform."""
+    """Place (d,); between it and the chosen places, there is no contact and the cables can hold the
+    platform."""
     chosen: FloatArray
 
     def batches(self) -> Iterator[FloatArray]:

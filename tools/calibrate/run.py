@@ -311,7 +311,7 @@ def truth_comparison_of(
 def truth_comparison_of_folder(
     robot: Robot, folder: Path
 ) -> Callable[[Outcome], TruthComparison] | None:
-    """Return the function for the folder of a run; None if the folder holds only readings."""
+    """Return such a function for the run in a folder; None if the folder has only readings."""
     if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
         return None
     return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
@@ -328,7 +328,7 @@ def _going_on(robot: Robot, kept: StoredRun) -> str:
 
 
 def _scanned_s(pose: int) -> float:
-    """Return the additional time of the scanner at a pose for verification, counted from 0.
+    """Return the extra time for which the scanner measures a pose (from 0) for verification.
 
     The first pose takes longest, because all errors are relative to it and contain its error.
     """

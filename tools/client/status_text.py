@@ -260,8 +260,8 @@ _LOOSE_N = 1.0
 def next_steps(status: dict[str, Any]) -> list[str]:
     """Return what to do before a robot can move, as lines with commands; none if it can or moves.
 
-    As broken it names what the controller knows: the cause of a fault, and cables that seemed
-    broken and have not been tight since.
+    The broken parts that it names are those known to the controller: the cause of a fault, and
+    cables that seemed broken and have not been tight since.
     """
     state, last = status["state"], status.get("last_stop")
     if status["read_only"] or status.get("busy") or status.get("reacting", "none") != "none":

@@ -53,7 +53,7 @@ def shares(
 def written_as(
     *endings: str, mark: bytes = OWN_MARK
 ) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
-    """Return the callback of an option for an output file, whose name must have such an ending.
+    """Return the callback of an option for an output file whose name needs one of `endings`.
 
     Before the work begins, it raises BadInputError if the file cannot be written, or if it exists
     and does not begin with `mark`.

@@ -101,7 +101,7 @@ def fault_words(what: str, amount: int) -> str:
 
 
 class InjectionAccess:
-    """Access to object 2F00h of one simulated drive while any program runs the robot.
+    """Access to object 2F00h of one simulated drive, whichever program runs the robot.
 
     A context manager.
 

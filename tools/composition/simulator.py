@@ -29,7 +29,7 @@ _numbers, _trials = count(1), count()
 
 
 class _OwnProcess:
-    """A command of this package that ends when its standard input closes, so also if we die."""
+    """A command of this package that ends when its standard input closes, even if we die."""
 
     def __init__(
         self, *command: str, meanwhile: Callable[[], None] | None = None, waits: bool = True

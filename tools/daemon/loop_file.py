@@ -75,7 +75,7 @@ class LoopFile(BaseModel):
             raise
 
     def remove(self, path: Path) -> None:
-        """Remove the file, and the socket left by a killed loop, unless another loop's."""
+        """Remove the file, and the socket left by a killed loop, unless they are another's."""
         with suppress(WorkFailedError, OSError):
             if LoopFile.read(path) == self:
                 path.unlink()

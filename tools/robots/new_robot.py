@@ -160,7 +160,8 @@ def _held_boxes(answers: Answers, least: FloatArray, most: FloatArray) -> Iterat
 def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None:
     """Return the least and greatest mass that can be accelerated in the middle of the frame.
 
-    Masses are up to `_MASSES` times as large or small as `usual_kg`. Returns None if all fail.
+    The masses tried are up to `_MASSES` times as large or small as `usual_kg`. Returns None if all
+    fail.
     """
     exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     place = 0.5 * (exits.min(axis=0) + exits.max(axis=0))
@@ -176,7 +177,7 @@ def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None
 
 
 def _centred(box: Box, middle_m: FloatArray) -> Box:
-    """Return the box, or the largest one in it about the frame's middle if almost as large."""
+    """Return the box, or the largest one in it about `middle_m`, if that is almost as large."""
     low, high = np.array(box.low_m), np.array(box.high_m)
     half = np.minimum(high - middle_m, middle_m - low)[:-1]
     if half.min() <= 0.0 or np.prod(2.0 * half / (high - low)[:-1]) < _CENTRED_SHARE:

@@ -33,7 +33,7 @@ _SEEN_THROUGH = 0.6
 _SEEN_FROM = "from the side", "from the front", "from above"
 """The viewpoint along each axis."""
 _OUTLINE = 721
-"""Number of directions in which the furthest anchor point belongs to the platform's outline."""
+"""Number of directions for the platform's outline, the furthest anchor point in each of them."""
 
 # shares of the exit points' extent: names of points closer than this would touch
 _CLOSE = 0.1

@@ -83,7 +83,7 @@ class OperatorParameters:
     look_s: float = 0.28
     """Time for which a picture must stand still before it is judged."""
     still_m: float = 0.2e-3
-    """Motion that still counts as still: one pixel, and one scaled step of the master."""
+    """Motion that counts as standing still: one pixel, and one scaled step of the master."""
     patience_s: float = 2.0
     """Longest wait for a still picture before the operator judges a moving one."""
 

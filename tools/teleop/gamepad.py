@@ -65,8 +65,9 @@ class StickMap:
 class Stick(Hand):
     """A hand that moves as fast as sticks are pushed, while the dead man's button is held.
 
-    The speed grows with the square of the travel beyond the dead zone, to allow slow motion. Only a
-    press counts that this process has seen: a button that was already held does not move the robot.
+    The speed grows with the square of the travel beyond the dead zone, to allow slow motion. A
+    press counts only if this process has seen it: a button that was already held does not move the
+    robot.
     """
 
     def __init__(self, stick_map: StickMap, scale: float) -> None:

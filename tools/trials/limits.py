@@ -29,7 +29,7 @@ _LONG_EVERY: Final = 5
 """A long rest follows every n-th finished move."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
 _MOVED: Final = 2e-3
-"""In a direction in which it moves less than this, a leg cannot overshoot, m or rad."""
+"""Least motion of a leg in a direction, m or rad, for which an overshoot is computed."""
 _THERE: Final = 1e-5
 """A set-point this near to its target counts as standing there, m or rad."""
 _TORQUE_STEP_SHARE: Final = 1e-3
@@ -72,7 +72,7 @@ class TargetLeg:
         return self._beyond(true, self.target)
 
     def overshoot_of_rest(self, true: FloatArray, rested: int) -> FloatArray | None:
-        """Return the overshoot beyond the place of rest; None if that rest was below `rested`."""
+        """Return the overshoot beyond the place of rest; None if the leg rested < `rested` rows."""
         return None if self.stood < rested else self._beyond(true, true[self.rows][-1])
 
     def _beyond(self, true: FloatArray, place: FloatArray) -> FloatArray:
