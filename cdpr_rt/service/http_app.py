@@ -28,6 +28,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
+from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service import http_models as models
 from cdpr_rt.service.access_control import VALID_S
 from cdpr_rt.service.lease import LeaseError
@@ -507,6 +508,7 @@ _OPEN_COMMANDS: Final = {
 def _add_open_commands(app: FastAPI, service: Service) -> None:
     def add(do: str, about: str) -> None:
         async def command(body: models.ClientRequest | None = None) -> models.Done:
+            service.stops += do in STOPS
             return _done(await service.command(do, body.client if body else "somebody"))
 
         app.post(f"/{do}", responses=_REFUSALS, name=do, description=about)(command)

@@ -148,6 +148,8 @@ class Service:
         """Resumes the launcher if it was stopped (SIGSTOP, Ctrl-Z)."""
         self.inject: Callable[[int, str], str] | None = None
         """Breaks or mends a simulated axis and returns what it did; None for real drives."""
+        self.stops = 0
+        """Number of stops that came past `/control`; they cancel the orders that wait there."""
         self._held_by = ""
         self._noted: Reply | None = None
         self._stops_taken = int(self.link.status().get("stops", {}).get("taken", 0))
@@ -321,6 +323,7 @@ class Service:
             return
         self._stops_taken = taken
         text = f"{stops['do']} by {stops['client']}"
+        self.stops += 1
         self.planner.cancel(text)
         self.events.add("command", text)
         if stops["do"] == "shutdown":  # the loop needs no launcher to stop

@@ -49,8 +49,8 @@ _SET: Final = TypeAdapter(models.Set)
 class ControlSocket:
     """One accepted connection of `client`, which holds the right under `token`.
 
-    Orders are carried out one after the other, except `hold`: it overtakes all of them, and those
-    sent before it that have not begun are rejected.
+    Orders are carried out one after the other, except `hold`: it overtakes all of them. Orders that
+    have not begun when somebody stops the robot are rejected.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ControlSocket:
         self._service = service
         self._socket = socket
         self._client, self._token, self._ttl_s = client, token, ttl_s
-        self._orders: asyncio.Queue[Order] = asyncio.Queue(_MOST_WAITING)
+        self._orders: asyncio.Queue[tuple[Order, int]] = asyncio.Queue(_MOST_WAITING)
         self._is_working = False
         self._holds: set[asyncio.Task[None]] = set()
         self._reading: asyncio.Task[tuple[int, str] | None] | None = None
@@ -115,16 +115,19 @@ class ControlSocket:
             hold = asyncio.create_task(self._carry_out(order))
             self._holds.add(hold)
             hold.add_done_callback(self._holds.discard)
-            for one in before:
-                await self._refuse(one.id, f"{one.do}: cancelled by a later stop")
+            for one, _ in before:
+                await self._cancel(one)
         elif self._orders.full():
             await self._refuse(order.id, f"{_MOST_WAITING} orders are already waiting")
         else:
-            self._orders.put_nowait(order)
+            self._orders.put_nowait((order, self._service.stops))
 
     async def _work(self) -> None:
         while True:
-            order = await self._orders.get()
+            order, stops = await self._orders.get()
+            if stops != self._service.stops and order.do != "renew":
+                await self._cancel(order)
+                continue
             self._is_working = True
             await self._carry_out(order)
             self._is_working = False
@@ -163,6 +166,9 @@ class ControlSocket:
             wanted = {"wanted": change.wanted}
             reply = await service.command_with_right("set", client, token, _is_here, **wanted)
         return reply.state, None if reply.ok else reply
+
+    async def _cancel(self, order: Order) -> None:
+        await self._refuse(order.id, f"{order.do}: cancelled by a later stop")
 
     async def _refuse(self, number: int | None, why: str) -> None:
         await self._reply(id=number, ok=False, error=why)

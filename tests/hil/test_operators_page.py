@@ -149,6 +149,32 @@ def test_a_motion_holds_when_its_page_is_closed(
     assert "right to move" in daemon.status()["reason"]
 
 
+def test_a_stop_cancels_a_move_that_still_waits_for_the_right_to_move(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        before_m, held_up = position_m(daemon), []
+        page.route("**/ticket", held_up.append)
+        send_to(page, "300", "2000")
+        until(lambda: held_up)
+        page.keyboard.press("Space")
+        until(lambda: "hold by page" in daemon.status()["commanded"])
+        held_up[0].continue_()
+        page.get_by_role("alert").filter(has_text="you have stopped the robot").wait_for()
+        assert position_m(daemon) == pytest.approx(before_m, abs=2e-3)
+
+
+def test_a_page_with_the_key_of_an_earlier_run_takes_the_present_address(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    url = address(daemon)
+    with opened(browser, f"{url.partition('=')[0]}=that-of-an-earlier-run") as page:
+        see(page, "This page needs its key")
+        page.goto(url)  # the same page for the browser: only what follows # differs
+        see(page, "Holding the platform")
+
+
 def test_without_its_key_the_page_shows_nothing_and_asks_for_it(
     daemon: RealDaemon, browser: playwright_api.Browser
 ) -> None:

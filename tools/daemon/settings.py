@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from secrets import token_urlsafe
 from typing import Annotated, Self
+from urllib.parse import quote
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -206,7 +207,7 @@ class RunSettings(BaseModel):
             at = Address(host=self.http.host, port=listener.getsockname()[1])
         if at.host in ("0.0.0.0", "::"):  # every address of this machine
             at = Address(host=socket.gethostname(), port=at.port)
-        return f"http://{at}/#key={(self.page_key() or b'').decode()}"
+        return f"http://{at}/#key={quote(self.page_key() or b'', safe='')}"
 
     @property
     def shared_fds(self) -> tuple[int, ...]:

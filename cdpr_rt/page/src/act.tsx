@@ -4,7 +4,10 @@ import { type Platform, clientName, command, hasKey, request, setKey } from "./d
 import { STEP_LABELS, type Situation, type Step, progressOf, situationOf } from "./situation";
 import { store, useStore } from "./store";
 
-const stop = (): void => void store.attempt(() => command("/hold"));
+const stop = (): void => {
+  store.right.stop();
+  void store.attempt(() => command("/hold"));
+};
 
 /** The stop acts on one press or on the space bar, with or without the right to move. */
 export function StopButton() {
@@ -23,15 +26,15 @@ export function StopButton() {
     };
   }, []);
   return (
-    <button class="stop" onPointerDown={stop} onKeyDown={(event) => event.key === "Enter" && stop()} title="Brake and hold with power: press, or space bar">
+    <button class="stop" onPointerDown={stop} onClick={(event) => event.detail === 0 && stop()} title="Brake and hold with power: press, or space bar">
       Stop <kbd>space</kbd>
     </button>
   );
 }
 
 export function PowerOff() {
-  const { status } = useStore();
-  const off = status?.state !== "active";
+  const { status, connected } = useStore();
+  const off = connected && status?.state !== "active"; // a state that may be old disables nothing
   return <button class="power" disabled={off} onClick={() => void store.attempt(() => command("/disable"))} title="Stop the motion, then switch the power off">Power off</button>;
 }
 
@@ -49,10 +52,23 @@ export function useSituation(): Situation {
   return situationOf(status, description, connected);
 }
 
+const SETTLE_MS = 500;
+
+/** Return whether a value has not changed for a moment, in which a press may be meant for the one before. */
+function useSettled(value: unknown): boolean {
+  const [settled, setSettled] = useState<unknown>(null);
+  useEffect(() => {
+    const timer = setTimeout(() => setSettled(value), SETTLE_MS);
+    return () => clearTimeout(timer);
+  }, [value]);
+  return settled === value;
+}
+
 export function NextStep() {
   const { rejected } = useStore();
   const { tone, title, detail, next } = useSituation();
   const [working, setWorking] = useState(false);
+  const settled = useSettled(next);
   const press = async (step: Exclude<Step, "move">): Promise<void> => {
     setWorking(true);
     await store.attempt(STEPS[step]);
@@ -63,7 +79,7 @@ export function NextStep() {
       <h1 aria-live="polite">{title}</h1>
       {detail && <p>{detail}</p>}
       {rejected && <p class="rejected" role="alert">{rejected} <button class="plain" onClick={() => store.change({ rejected: "" })}>Close</button></p>}
-      {next && next !== "move" && hasKey() && <button class="next" disabled={working} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
+      {next && next !== "move" && hasKey() && <button class="next" disabled={working || !settled} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
       {!hasKey() && <Key />}
     </section>
   );

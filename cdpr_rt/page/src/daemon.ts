@@ -47,6 +47,7 @@ const RATE_Hz = 30;
 const RETRY_MS = 1000;
 const SILENT_MS = 4000;
 const KEY = "cdpr-key";
+const UNAUTHORIZED = 401;
 
 /** Take the key from the address, where `cdpr run` puts it, and keep it for this tab. */
 function takeKey(): string {
@@ -59,6 +60,8 @@ function takeKey(): string {
 }
 
 let key = takeKey();
+// an address with another key, entered while the page is open, loads nothing by itself
+addEventListener("hashchange", () => location.reload());
 
 export const hasKey = (): boolean => key !== "";
 
@@ -80,6 +83,7 @@ export async function request<T>(
   } catch {
     throw new Rejected("The daemon does not answer. Is `cdpr run` still running?");
   }
+  if (answer.status === UNAUTHORIZED) setKey(""); // the key of an earlier run: ask for the present one
   const text = await answer.text();
   if (answer.ok) return JSON.parse(text) as T;
   let why = text;
@@ -143,6 +147,8 @@ function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
 
 const TTL_S = 2;
 const RENEW_MS = 500;
+/** A step is not carried out if the right to move came later than this: the operator may have moved on. */
+const LATE_MS = 2000;
 
 /**
  * The right to move, held for as long as its connection lives.
@@ -153,6 +159,8 @@ export class Right {
   #socket: WebSocket | null = null;
   #token = "";
   #number = 0;
+  #stops = 0;
+  #taking: Promise<void> | null = null;
   #waiting = new Map<number, (answer: { ok: boolean; error: string | null }) => void>();
   changed: () => void = () => undefined;
 
@@ -160,9 +168,23 @@ export class Right {
     return this.#token !== "";
   }
 
-  /** Take the right if it is not held yet; throws `Rejected` with the holder's name. */
-  async take(): Promise<void> {
+  /** Cancel this page's steps that have not begun, and stop in their order on the same connection. */
+  stop(): void {
+    this.#stops++;
+    this.#socket?.send(JSON.stringify({ do: "hold", client: clientName() }));
+  }
+
+  /** Take the right for a step; throws `Rejected` with the holder's name, or if the step came too late or was stopped. */
+  async #takeForStep(): Promise<void> {
     if (this.held) return;
+    const stops = this.#stops, began = performance.now();
+    this.#taking ??= this.#take().finally(() => (this.#taking = null));
+    await this.#taking;
+    if (this.#stops !== stops) throw new Rejected("Cancelled: you have stopped the robot.");
+    if (performance.now() - began > LATE_MS) throw new Rejected("The daemon answered late, so nothing was started. Try again.");
+  }
+
+  async #take(): Promise<void> {
     const socket = await socketTo("/control", { client: clientName(), ttl_s: String(TTL_S) });
     await new Promise<void>((taken, failed) => {
       socket.onmessage = ({ data }) => {
@@ -178,7 +200,7 @@ export class Right {
         }
       };
       socket.onclose = ({ reason }) => {
-        this.#forget(reason || "The connection to the daemon was lost.");
+        if (this.#socket === socket) this.#forget(reason || "The connection to the daemon was lost.");
         failed(new Rejected(reason || "The daemon did not give this page the right to move."));
       };
     });
@@ -193,12 +215,12 @@ export class Right {
   }
 
   async enable(): Promise<void> {
-    await this.take();
+    await this.#takeForStep();
     await request("POST", "/enable", { client: clientName(), program: "hold" }, this.#token);
   }
 
   async program(program: string, wanted: Record<string, unknown> = {}): Promise<void> {
-    await this.take();
+    await this.#takeForStep();
     const id = ++this.#number;
     const answer = await new Promise<{ ok: boolean; error: string | null }>((resolve) => {
       this.#waiting.set(id, resolve);

@@ -80,7 +80,9 @@ export function situationOf(status: Status | null, description: Description | nu
     case "fault": return faultOf(status);
     case "unconfigured": return situation("off", "Drives not booted", status.reason, "configure");
     case "inactive": return situation("off", "No power", status.reason || "The drives are booted", "check");
-    case "ready": return readyOf(status);
+    case "ready": return status.read_only
+      ? situation("ready", "Listening only", status.reason || "Another master moves this robot")
+      : readyOf(status);
     case "active": return activeOf(status, description);
     default: return situation("off", status.state, status.reason);
   }

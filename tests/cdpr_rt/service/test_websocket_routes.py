@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from itertools import pairwise
+from threading import Thread
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
@@ -213,6 +214,24 @@ def test_a_hold_overtakes_and_cancels_earlier_requests_of_its_connection(rig: Ri
         assert answers[3]["ok"] and answers[4]["ok"]
     # unlike the real loop, this one obeys requests that a stop has cancelled
     assert [command["do"] for command in rig.loop.commands] == ["hold", "program", "set"]
+
+
+def test_a_stop_by_another_client_cancels_orders_that_wait(rig: Rig) -> None:
+    rig.loop.answers = False
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(60.0)
+        connection.send(json.dumps({"do": "program", "program": "jog", "id": 0}))
+        wait_for(lambda: len(rig.service.link._pending) == 1)
+        connection.send(json.dumps({"do": "program", "program": "jog", "id": 1}))
+        assert ask(connection, do="jump", id=2)["ok"] is False  # so the order before is waiting
+        stopping = Thread(target=lambda: rig.client().post("/hold", json={"client": "jan"}))
+        stopping.start()
+        wait_for(lambda: len(rig.service.link._pending) == 2)
+        rig.loop.answers = True
+        answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(2))}
+        stopping.join()
+        assert answers[1]["error"] == "program: cancelled by a later stop"
+    assert sorted(command["do"] for command in rig.loop.commands) == ["hold", "program"]
 
 
 def test_a_client_that_disconnects_while_waiting_loses_the_right_immediately(rig: Rig) -> None:
