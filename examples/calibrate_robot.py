@@ -18,7 +18,9 @@ TRACKER_STD_M = 0.0005
 
 def main(folder: Path) -> None:
     """Calibrate into a folder, then read the results."""
-    folder.mkdir(exist_ok=True)
+    if folder.exists():
+        sys.exit(f"{folder} exists: add the name of a new folder to the command")
+    folder.mkdir()
     plant = folder / "plant.toml"
     errors_m = [[1e-3 * x for x in point] for point in ERRORS_MM]
     plant.write_text(f"[geometry]\nexit_errors_m = {errors_m}\n", encoding="utf-8")

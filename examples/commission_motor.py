@@ -14,6 +14,8 @@ import cdpr_rt as cdpr
 
 def main(folder: str) -> None:
     """Commission the motor into a folder, then read the results."""
+    if Path(folder).exists():
+        sys.exit(f"{folder} exists: add the name of a new folder to the command")
     try:
         result = cdpr.commission("winch-mpp0923d", bus="simbus:", folder=folder, quick=True)
     except cdpr.Faulted as fault:  # the motor has no power; the recordings are in the folder

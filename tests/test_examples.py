@@ -72,6 +72,21 @@ def test_example_succeeds_and_prints_its_results(name: str, tmp_path: Path) -> N
         assert (tmp_path / "move_a_robot.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("name", ["commission_motor", "calibrate_robot"])
+def test_an_example_keeps_the_results_of_an_earlier_run(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / f"{name}.py")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    wanted = f"{name} exists: add the name of a new folder to the command\n"
+    assert (done.returncode, done.stderr) == (1, wanted)
+
+
 def test_an_example_without_its_package_names_it_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "gymnasium.py").write_text("raise ImportError")
     done = subprocess.run(

@@ -9,6 +9,11 @@ const stop = (): void => {
   void store.attempt(() => command("/hold"));
 };
 
+const powerOff = (): void => {
+  store.right.cancel();
+  void store.attempt(() => command("/disable"));
+};
+
 /** The stop acts on one press or on the space bar, with or without the right to move. */
 export function StopButton() {
   useEffect(() => {
@@ -35,7 +40,7 @@ export function StopButton() {
 export function PowerOff() {
   const { status, connected } = useStore();
   const off = connected && status?.state !== "active"; // a state that may be old disables nothing
-  return <button class="power" disabled={off} onClick={() => void store.attempt(() => command("/disable"))} title="Stop the motion, then switch the power off">Power off</button>;
+  return <button class="power" disabled={off} onClick={powerOff} title="Stop the motion, then switch the power off">Power off</button>;
 }
 
 const STEPS: Record<Exclude<Step, "move">, () => Promise<unknown>> = {

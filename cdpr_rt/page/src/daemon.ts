@@ -148,7 +148,7 @@ function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
 const TTL_S = 2;
 const RENEW_MS = 500;
 /** A step is not carried out if the right to move came later than this: the operator may have moved on. */
-const LATE_MS = 2000;
+const LATE_MS = 5000;
 
 /**
  * The right to move, held for as long as its connection lives.
@@ -168,9 +168,14 @@ export class Right {
     return this.#token !== "";
   }
 
-  /** Cancel this page's steps that have not begun, and stop in their order on the same connection. */
-  stop(): void {
+  /** Cancel this page's steps that still wait for the right. */
+  cancel(): void {
     this.#stops++;
+  }
+
+  /** The same, and stop on the connection on which the other steps were sent, after them. */
+  stop(): void {
+    this.cancel();
     this.#socket?.send(JSON.stringify({ do: "hold", client: clientName() }));
   }
 

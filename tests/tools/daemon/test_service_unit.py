@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from hypothesis import given
@@ -99,6 +100,19 @@ def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: 
     assert words in made.stderr
     assert "Traceback" not in made.stderr
     assert len(made.stderr.strip().splitlines()) == 1
+
+
+def test_the_address_of_the_page_keeps_every_character_of_the_key(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_text("ab+/&=#%25 0123456789\n")
+    key.chmod(0o600)
+    at = Address(host="127.0.0.1", port=0)
+    asked = RunSettings(robot="r", name="r", socket=tmp_path / "s", http=at, key_file=key)
+    settings = asked.with_key_loaded().with_ports_bound()
+    read = parse_qs(urlsplit(settings.page_url()).fragment)
+    os.close(settings.http_fd)
+    os.close(settings.key_fd)
+    assert read == {"key": ["ab+/&=#%25 0123456789"]}
 
 
 def test_a_key_must_be_long_and_readable_only_by_its_owner(tmp_path: Path) -> None:
