@@ -154,7 +154,8 @@ def test_a_stop_cancels_a_move_that_still_waits_for_the_right_to_move(
 ) -> None:
     with opened(browser, address(daemon)) as page:
         see(page, "Holding the platform")
-        before_m, held_up = position_m(daemon), []
+        before_m = position_m(daemon)
+        held_up: list[playwright_api.Route] = []
         page.route("**/ticket", lambda route: held_up.append(route))
         send_to(page, "300", "2000")
         until(lambda: held_up)
