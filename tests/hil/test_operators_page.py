@@ -156,7 +156,7 @@ def test_a_stop_cancels_a_move_that_still_waits_for_the_right_to_move(
         see(page, "Holding the platform")
         before_m = position_m(daemon)
         held_up: list[playwright_api.Route] = []
-        page.route("**/ticket", lambda route: held_up.append(route))
+        page.route("**/ticket", lambda route: held_up.append(route))  # noqa: PLW0108  # no built-in
         send_to(page, "300", "2000")
         until(lambda: held_up)
         page.keyboard.press("Space")
