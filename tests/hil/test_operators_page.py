@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
+import matplotlib.image as mpl_image
 import pytest
 from daemon_rig import PATIENCE_S, RealDaemon, until
 
@@ -22,8 +24,10 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 _WITHOUT_SCREEN = [
     "--no-sandbox", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--no-first-run", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-sync", "--no-first-run",
 ]  # fmt: skip
+_DRAWING = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""Without a graphics processor, drawing in three dimensions takes most of the processor's time."""
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +42,9 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[playwright_api.Browser]:
     with playwright_api.sync_playwright() as api:
-        browser = api.chromium.launch(executable_path=_CHROMIUM, args=_WITHOUT_SCREEN)
+        browser = api.chromium.launch(
+            executable_path=_CHROMIUM, args=[*_WITHOUT_SCREEN, "--disable-3d-apis"]
+        )
         yield browser
         browser.close()
 
@@ -205,3 +211,24 @@ def test_a_page_finds_the_daemon_again_after_its_service_was_killed(
         os.kill(daemon.children()["service"], signal.SIGKILL)
         see(page, "No connection")
         see(page, "Holding the platform")
+
+
+def test_the_robot_is_drawn_and_the_page_works_without_drawing(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        page.get_by_text("This browser cannot draw in three dimensions").wait_for()
+    args = [*_WITHOUT_SCREEN, *_DRAWING]
+    with (
+        closing(browser.browser_type.launch(executable_path=_CHROMIUM, args=args)) as drawing,
+        opened(drawing, address(daemon), width=400) as page,
+    ):
+        see(page, "Holding the platform")
+        canvas = page.locator(".scene canvas")
+        until(lambda: len(set(_colours(canvas.screenshot()))) > 3)
+
+
+def _colours(png: bytes) -> list[tuple[float, ...]]:
+    """Return the colours of a picture's pixels, of every fifth row and column."""
+    pixels = mpl_image.imread(io.BytesIO(png))[::5, ::5, :3]
+    return [tuple(pixel) for row in pixels.tolist() for pixel in row]
