@@ -291,11 +291,14 @@ def _rebuild(target_context: Any, payload: Any) -> Any:
     numba parses the bitcode of each kernel when it loads it, which takes twice as long as all other
     loading. Only kernels that call this one, and are compiled later, need the bitcode.
     """
-    (name, kind, (machine_code, bitcode)), described, *others = payload
-    engine = target_context.codegen()._engine
+    rebuild: Callable[..., Any] = CompileResult._rebuild
+    try:
+        (name, kind, (machine_code, bitcode)), described, *others = payload
+        engine = target_context.codegen()._engine
+    except (ValueError, AttributeError):  # a version of numba that stores them differently
+        return rebuild(target_context, *payload)
     engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
     library_data = name, kind, (machine_code, _empty_bitcode())
-    rebuild: Callable[..., Any] = CompileResult._rebuild
     result = rebuild(target_context, library_data, described, *others)
     library = result.library
     library._shared_module = None

@@ -400,7 +400,7 @@ def _launch(
         url = settings.page_url()
         if url and open_it:
             open_page(url, out)
-        _report_ready(report, url, out)
+        _report_ready(report, url.partition("#")[0] if settings.has_key else url, out)
 
     out.note(_recording_text(robot, settings))
     out.note("starting the control loop ...")
@@ -415,7 +415,8 @@ def _launch(
 def _report_ready(report: dict[str, Any], url: str, out: Output) -> None:
     """Report on standard output that the daemon is ready, as JSON unless a person reads it.
 
-    Only a terminal shows the page's key, because other output may go to a log.
+    Only a terminal shows the page's key, and only one made for this run: other output may go to a
+    log.
     """
     report["page"] = url.partition("#")[0] or None
     if out.as_json or not sys.stdout.isatty():

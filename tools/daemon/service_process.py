@@ -21,7 +21,7 @@ from typing import Any, Final
 from starlette.types import ASGIApp
 from typing_extensions import override
 
-from cdpr_profiles.errors import printable
+from cdpr_profiles.errors import ProfileError, printable
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.path_store import keep_progress, paths_folder
@@ -275,7 +275,7 @@ def inject_fault(settings: RunSettings, axis: int, fault: str) -> str:
         one = robot.axes[axis]
         with InjectionAccess(robot, one, robot_urls(robot, settings.buses)[one.bus]) as access:
             amount = access.inject(fault, None)
-    except CommandError as error:
+    except (CommandError, ProfileError) as error:
         raise InjectionError(str(error)) from None
     return f"{one.name}: {'mended' if fault == MEND else fault_words(fault, amount)}"
 

@@ -90,7 +90,7 @@ export function NextStep() {
   );
 }
 
-/** Without the key, this page can at most look on and stop. */
+/** Without the key, this page can do nothing, unless the daemon lets everybody look on and stop. */
 function Key() {
   const [text, setText] = useState("");
   return (
