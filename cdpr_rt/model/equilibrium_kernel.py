@@ -41,6 +41,9 @@ CELL_SHARE = 0.15
 reserve is the standard deviation of tensions estimated from the motors."""
 FORCE_SHARE, CENTRE_STD_m, TILT_STD_rad = 0.004, 1e-3, 2e-3
 """Uncertainty of weight, centre of mass, and inclinometer."""
+MOST_MOMENT = 0.1
+"""Largest unexplained moment, over the weight and the reach of the anchor points. An inclinometer
+that needs more contradicts the robot's file, for example because it is mounted another way."""
 _MOST_TURN_rad, _LEAST_PIVOT = 0.2, 1e-12
 
 
@@ -72,17 +75,23 @@ def say_tensions(
 
 @jit
 def learn_moment(
-    pose: FloatArray, known: FloatArray, upward: FloatArray, rows: FloatArray, share: float
+    pose: FloatArray,
+    known: FloatArray,
+    upward: FloatArray,
+    rows: FloatArray,
+    share: float,
+    most_Nm: float,
 ) -> float:
     """Correct the unexplained MOMENT by a `share` of the value that explains the inclinometer.
 
-    `rows` are those of the last step. In motion, the estimate follows the equilibrium quickly and
+    Its components stay within `most_Nm`, so that a wrong reading has a bounded effect. `rows` are those of the last step. In motion, the estimate follows the equilibrium quickly and
     the inclinometer slowly: if it followed a swing, the control would excite the swing. Returns the
     angle between the estimate and the reading, which is the angle of the swing.
     """
     x, y, _ = _turned(pose, upward[1], upward[2], upward[3])
-    known[MOMENT] -= share * rows[3, 3] * y
-    known[MOMENT + 1] += share * rows[4, 4] * x
+    about_x, about_y = -share * rows[3, 3] * y, share * rows[4, 4] * x
+    known[MOMENT] = min(max(known[MOMENT] + about_x, -most_Nm), most_Nm)
+    known[MOMENT + 1] = min(max(known[MOMENT + 1] + about_y, -most_Nm), most_Nm)
     return math.hypot(x, y)
 
 

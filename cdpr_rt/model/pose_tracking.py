@@ -208,9 +208,11 @@ def _hang(
         hanging.normal, hanging.rows, share,
     )  # fmt: skip
     if hanging.upward[0] > 0.0:
+        most_Nm = equilibrium.MOST_MOMENT * hanging.known[equilibrium.WEIGHT]
         angle = equilibrium.learn_moment(
-            pose, hanging.known, hanging.upward, hanging.rows, min(slow, _MOST_LEARNT)
-        )
+            pose, hanging.known, hanging.upward, hanging.rows, min(slow, _MOST_LEARNT),
+            most_Nm * hanging.settings[REACH_m],
+        )  # fmt: skip
         swing[AMPLITUDE] = max(angle, (1.0 - slow) * swing[AMPLITUDE])
         swing[AMPLITUDE_m] = hanging.settings[REACH_m] * swing[AMPLITUDE]
 

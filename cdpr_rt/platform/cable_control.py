@@ -28,7 +28,7 @@ from cdpr_rt.model.cable_kernel import (
     run_cables,
     write_tension_rises,
 )
-from cdpr_rt.model.equilibrium_kernel import TENSIONS, known_of
+from cdpr_rt.model.equilibrium_kernel import KNOWN, MOMENT, MOST_MOMENT, TENSIONS, WEIGHT, known_of
 from cdpr_rt.model.free_rotation_kernel import SHAPING_s, rotation_of
 from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.platform_model import PlatformModel
@@ -242,6 +242,12 @@ def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float)
 
 _ON_STAND = 0.1  # of the integral part
 _NO_TILT = "the inclinometer gives no valid reading: the pose is less accurate"
+_WRONG_TILT = (
+    "check mounting_rad, angles, scale_rad and zero_rad of the inclinometer, and centre_of_mass_m of "
+    "the platform; until then the pose is less accurate"
+)
+_LEVEL = np.cos(np.radians(5.0))
+"""Cosine of the largest tilt that an inclinometer may show on the stand."""
 _SETTLING_STEPS, _LIFT_S, _COMES_AFTER_S = 60, 0.05, 0.1
 
 
@@ -523,8 +529,20 @@ class CableControl(PlaceChecks):
 
     def notices(self) -> list[str]:
         """Return which sensor is wrong and if the loop oscillates, until `clear_notices`."""
-        silent = _NO_TILT * bool(self._hanging.upward[0] < 0.0)
-        return [text for text in (self._check.trouble, self._oscillation.trouble, silent) if text]
+        told = (self._check.trouble, self._oscillation.trouble, self._tilt_trouble())
+        return [text for text in told if text]
+
+    def _tilt_trouble(self) -> str:
+        """Return why the inclinometer is of no use, "" if it is of use or missing."""
+        hanging = self._hanging
+        if hanging.upward[0] <= 0.0:
+            return _NO_TILT * bool(hanging.upward[0] < 0.0)
+        most_Nm = MOST_MOMENT * hanging.known[WEIGHT] * hanging.settings[tracking.REACH_m]
+        if np.abs(hanging.known[MOMENT:KNOWN]).max() >= most_Nm:
+            return f"the inclinometer contradicts lengths, tensions and weight: {_WRONG_TILT}"
+        if self._on_stand and self._home.Q[2] @ hanging.upward[1:] < _LEVEL:
+            return f"the inclinometer shows another orientation than that at home: {_WRONG_TILT}"
+        return ""
 
     def clear_notices(self) -> None:
         """Forget the findings about load cells and loop."""

@@ -21,8 +21,10 @@ TARGET_m = np.array([0.3, 0.25, 0.8])
 class Sensed(Physics):
     """The simulated robot, with ideal load cells or an ideal inclinometer."""
 
-    def __init__(self, machine: Machine, plant: RobotPlant, *, cells: bool, tilt: bool) -> None:
-        self._reads = cells, tilt
+    def __init__(
+        self, machine: Machine, plant: RobotPlant, *, cells: bool, tilt: bool, turned_deg: float = 0
+    ) -> None:
+        self._reads, self._mounting = (cells, tilt), Rotation.from_euler("x", turned_deg, True)
         self.read_N, self.measured, self.upward = np.zeros(4), np.zeros(4, bool), np.zeros(4)
         super().__init__(machine, plant)
 
@@ -34,7 +36,7 @@ class Sensed(Physics):
         if cells:
             self.read_N[:], self.measured[:] = self.robot.tension_N, True
         if tilt:
-            self.upward[:] = 1.0, *self.robot.rotation[2]
+            self.upward[:] = 1.0, *self._mounting.apply(self.robot.rotation[2])
 
     def rest(self) -> tuple[float, FloatArray, float]:
         """Go to the target and rest there.
@@ -66,6 +68,16 @@ def test_an_inclinometer_corrects_a_wrong_centre_of_mass() -> None:
     error_mm, off_deg, _ = Sensed(hung(), plant, cells=False, tilt=True).rest()
     assert np.linalg.norm(blind_deg[:2]) > 3.0 * np.linalg.norm(off_deg[:2])
     assert error_mm < 1.5 < blind_mm
+
+
+def test_a_wrongly_mounted_inclinometer_is_reported_and_has_a_bounded_effect() -> None:
+    machine = MACHINES["mass beside the middle"]
+    physics = Sensed(machine, RobotPlant(), cells=False, tilt=True, turned_deg=180.0)
+    physics.control.stand_still(on_stand=True)
+    assert "another orientation than that at home" in physics.control.notices()[0]
+    error_mm, _, _ = physics.rest()
+    assert "contradicts lengths, tensions and weight" in physics.control.notices()[0]
+    assert error_mm < 25.0
 
 
 def test_the_reported_swing_is_that_of_the_platform() -> None:
