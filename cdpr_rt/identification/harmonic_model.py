@@ -314,10 +314,10 @@ def choose(equations: Equations, fixed: list[int], rows: RowWeights) -> OrderSel
     size = np.arange(left.size)
     criterion = independent * np.log(left) + 2.0 * size * math.log(max(independent, 2.0) * count)
     best = int(np.argmin(criterion))
-    per_row = total.rows / max(float(kinds.rows @ rows.weight), 1e-300)
+    weights = float(kinds.rows @ (rows.weight / rows.correlation))
     return OrderSelection(
         tuple(sorted(equations.layout.orders[i] for i in added[:best])),
-        np.sqrt(left / total.rows * per_row),
+        np.sqrt(left / max(weights, 1e-300)),
         rows.correlation,
     )
 
