@@ -145,6 +145,8 @@ def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
         if given is not None:
             turns = np.column_stack([one.read(table, units) for one in given])
             seen &= np.isfinite(turns).all(axis=1)
+            if units is NUMBERS:  # a quaternion of zeros: the body was hidden
+                seen &= turns.any(axis=1)
     if np.count_nonzero(seen) < _FEWEST:
         problem = f"{np.count_nonzero(seen)} rows with a pose; allowed: {_FEWEST} or more"
         raise ProfileError(table.path, "", problem)

@@ -25,7 +25,7 @@ from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.imports.logs import read_any
-from cdpr_tools.imports.mapping import MotorMapping, motor_units, read_time
+from cdpr_tools.imports.mapping import MotorColumns, MotorMapping, motor_units, read_time
 from cdpr_tools.imports.tables import Table
 
 _LONGEST_STEP_S: Final = 2.5e-3
@@ -37,6 +37,10 @@ _STANDING_RAD: Final = math.radians(0.5)
 _LEAST_TURNS: Final = 0.5
 _FAST_RAD_S: Final = math.radians(60.0)
 _FEWEST_SAMPLES: Final = 100
+_FEWEST_ANGLES: Final = 10
+"""Of a static map."""
+_MOST_SPEED: Final = 2.0
+"""Highest plausible speed over the motor's rated speed."""
 _LATE: Final = 0.8
 """A fitted filter is reported if it leaves less than this share of the residual without it."""
 
@@ -92,6 +96,11 @@ def import_motor(files: Sequence[Path], mapping_path: Path, winch: Winch, paths:
         _write(path, what, run, valid, _meta(piece.table, mapping_path, winch, speed, lag_s))
         written.append(path)
         passes.append(_facts(path, piece, run, valid))
+    if not count["sweep"]:
+        notes.append(
+            f"all motions are faster than {math.degrees(_FAST_RAD_S):g} deg/s: `cdpr cogging fit` "
+            "needs a slower one too"
+        )
     return Imported(written, notes, lag_s, passes)
 
 
@@ -113,6 +122,9 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
         )
         raise ProfileError(table.path, "", problem)
     time, angle, torque = time[inside], angle[inside], torque[inside]
+    if np.ptp(angle) <= math.tau:  # an angle that begins again after each turn
+        angle = np.unwrap(angle)
+    _require_plausible(table, columns, time, angle, torque, winch)
     found = []
     for start, stop in _one_way(angle):
         part = slice(start, stop)
@@ -125,6 +137,35 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
             continue
         found.append(_Piece(table, Reading(time[part], angle[part], torque[part])))
     return found
+
+
+def _require_plausible(
+    table: Table,
+    columns: MotorColumns,
+    time: FloatArray,
+    angle: FloatArray,
+    torque: FloatArray,
+    winch: Winch,
+) -> None:
+    """Raise ProfileError for a wrong unit of time or angle, or a column that is not the torque."""
+    assert columns.time is not None
+    step_s = float(np.median(np.diff(time)))
+    if step_s > _GAP_S:
+        problem = (
+            f"column {columns.time.name!r}: the rows are {step_s:.3g} s apart; allowed: up to "
+            f"{_GAP_S:g} s; check the unit of the time"
+        )
+        raise ProfileError(table.path, "", problem)
+    speed_rad_s, most_rad_s = np.ptp(angle) / np.ptp(time), winch.motor.rated_speed_rad_s
+    if speed_rad_s > _MOST_SPEED * most_rad_s:
+        problem = (
+            f"the motor turns at {speed_rad_s:.3g} rad/s, but its rated speed is "
+            f"{most_rad_s:.3g} rad/s; check the units of time and angle"
+        )
+        raise ProfileError(table.path, "", problem)
+    if np.ptp(torque) == 0.0:
+        problem = f"column {columns.torque.name!r}: {torque[0]:g} Nm in all rows; choose another"
+        raise ProfileError(table.path, "", problem)
 
 
 def _shifted(time: FloatArray, values: FloatArray, by_s: float) -> FloatArray:
@@ -261,6 +302,9 @@ def _import_maps(
         angle = mapping.columns.angle.read_all(table, angles)
         torque = mapping.columns.torque.read_all(table, torques)
         count = angle.size
+        if count < _FEWEST_ANGLES:
+            problem = f"{count} rows; allowed: {_FEWEST_ANGLES} or more"
+            raise ProfileError(table.path, "", problem)
         run = SweepData(np.arange(count, dtype=float), angle, torque, angle, np.ones(count))
         to = paths.raw(f"map-{k}")
         _write(to, "map", run, np.ones(count), _meta(table, mapping_path, winch, 1.0, 0.0))

@@ -85,7 +85,9 @@ def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
     """Yield line number and cells of each line that is neither empty nor a comment."""
     lines = text.splitlines()
     kept = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    sample = "".join(kept[:_SAMPLE_LINES])
+    # the names decide: decimal commas would outnumber semicolons
+    named = [line for line in kept[:_SAMPLE_LINES] if any(one in line for one in _DELIMITERS)]
+    sample = "".join(named[:1])
     delimiter = max(_DELIMITERS, key=sample.count)
     try:
         for number, line in enumerate(lines, 1):

@@ -94,6 +94,26 @@ def test_a_recording_that_does_not_begin_at_home_names_the_home_to_write(tmp_pat
     assert "write home_m = [" in result.stderr
 
 
+def test_a_quaternion_of_zeros_counts_as_a_hidden_body(tmp_path: Path) -> None:
+    time = np.arange(0.0, 2.0, 0.01)
+    lengths = cable_lengths_m(np.tile(MODEL.home[:2], (time.size, 1)))
+    lines = ["t,l1,l2,l3,x,y,z,a,b,c,w"]
+    for k, (t, row) in enumerate(zip(time, lengths, strict=True)):
+        turn = "0,0,0,0" if k == 50 else "0,0,0,1"
+        x, y = MODEL.home[:2]
+        lines.append(f"{t},{row[0]},{row[1]},{row[2]},{x},{y},0,{turn}")
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    one = "{{ name = \"{}\" }}".format
+    (tmp_path / "map.toml").write_text(
+        f"[cables]\ntime = {one('t')}\nlengths = [{', '.join(map(one, ('l1', 'l2', 'l3')))}]\n"
+        f"[pose]\ntime = {one('t')}\nposition = [{', '.join(map(one, 'xyz'))}]\n"
+        f"quaternion = [{', '.join(map(one, 'abcw'))}]\n"
+    )
+    files = tmp_path / "a.csv", tmp_path / "a.csv", tmp_path / "map.toml"
+    result = run(tmp_path, files)
+    assert result.returncode == 0, result.stderr
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [

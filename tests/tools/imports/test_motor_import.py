@@ -141,6 +141,9 @@ def test_other_recordings_are_compared_for_each_method(
         (("1.0;2.0;3.0", "0.0;2.0;3.0"), {}, "line 4: t: the time does not increase"),
         (("1.0;2.0;3.0", "1.0;2.0;3.0;4.0"), {}, "line 4: 4 cells; allowed: up to 3"),
         (None, {}, "no motion of at least half a turn in one direction"),
+        (None, {"time": 'time = { name = "t" }'}, "apart; allowed: up to 0.05 s; check the unit"),
+        (None, {"time": 'time = { name = "t", unit = "ns" }'}, "check the units of time and angle"),
+        (("1.0;2.0;3.0", "1.0;2.0;0.1"), {}, "column 'iq': 0.0396687 Nm in all rows"),
     ],
 )
 def test_a_wrong_file_or_mapping_is_named_with_the_place(
@@ -157,6 +160,14 @@ def test_a_wrong_file_or_mapping_is_named_with_the_place(
     )
     assert result.returncode == 2
     assert text in result.stderr
+
+
+def test_an_angle_that_begins_again_after_each_turn_is_unwrapped(tmp_path: Path) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    rows = [f"{1e3 * t},{(50.0 * t) % 360.0},{0.1 + 0.01 * np.sin(t)}" for t in time]
+    (tmp_path / "a.csv").write_text("\n".join(["t,phi,iq", *rows]))
+    (only,) = imported(tmp_path / "out", mapping(tmp_path), tmp_path / "a.csv")["passes"]
+    assert only["turns"] == pytest.approx(20.0 * 50.0 / 360.0, abs=0.01)
 
 
 def test_a_static_map_is_compared(recorded: dict[str, Path], tmp_path: Path) -> None:
