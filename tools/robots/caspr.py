@@ -55,7 +55,9 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
         anchors.append(on_platform - centre_m * of_origin)
         keys = ("properties/force_min", "properties/force_max")
         forces.append([_number(cable, key, cables) for key in keys])
-    least_N, most_N = np.min(forces, axis=0)[0], np.min(forces, axis=0)[1]
+    if not forces:
+        raise BadInputError(f"{cables}: cable_set: contains no cables; allowed: one or more")
+    least_N, most_N = np.max(forces, axis=0)[0], np.min(forces, axis=0)[1]
     answers["tension_max_N"] = f"{most_N:g}"
     answers["tension_min_N"] = f"{max(least_N, _LEAST_SHARE * most_N):g}"
     for name, points in (("exit", exits), ("anchor", anchors)):
