@@ -84,8 +84,9 @@ def learn_moment(
 ) -> float:
     """Correct the unexplained MOMENT by a `share` of the value that explains the inclinometer.
 
-    Its components stay within `most_Nm`, so that a wrong reading has a bounded effect. `rows` are those of the last step. In motion, the estimate follows the equilibrium quickly and
-    the inclinometer slowly: if it followed a swing, the control would excite the swing. Returns the
+    Its components stay within `most_Nm`, so that a wrong reading has a bounded effect. `rows` are
+    those of the last step. In motion, the estimate follows the equilibrium quickly and the
+    inclinometer slowly: if it followed a swing, the control would excite the swing. Returns the
     angle between the estimate and the reading, which is the angle of the swing.
     """
     x, y, _ = _turned(pose, upward[1], upward[2], upward[3])

@@ -243,8 +243,8 @@ def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float)
 _ON_STAND = 0.1  # of the integral part
 _NO_TILT = "the inclinometer gives no valid reading: the pose is less accurate"
 _WRONG_TILT = (
-    "check mounting_rad, angles, scale_rad and zero_rad of the inclinometer, and centre_of_mass_m of "
-    "the platform; until then the pose is less accurate"
+    "check mounting_rad, angles, scale_rad and zero_rad of the inclinometer, and centre_of_mass_m "
+    "of the platform; until then the pose is less accurate"
 )
 _LEVEL = np.cos(np.radians(5.0))
 """Cosine of the largest tilt that an inclinometer may show on the stand."""

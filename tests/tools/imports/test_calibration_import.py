@@ -103,7 +103,7 @@ def test_a_quaternion_of_zeros_counts_as_a_hidden_body(tmp_path: Path) -> None:
         x, y = MODEL.home[:2]
         lines.append(f"{t},{row[0]},{row[1]},{row[2]},{x},{y},0,{turn}")
     (tmp_path / "a.csv").write_text("\n".join(lines))
-    one = "{{ name = \"{}\" }}".format
+    one = '{{ name = "{}" }}'.format
     (tmp_path / "map.toml").write_text(
         f"[cables]\ntime = {one('t')}\nlengths = [{', '.join(map(one, ('l1', 'l2', 'l3')))}]\n"
         f"[pose]\ntime = {one('t')}\nposition = [{', '.join(map(one, 'xyz'))}]\n"

@@ -85,7 +85,10 @@ def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -
     [
         ("", "contains no lines"),
         ("a,b\n", "contains no rows"),
-        ("t;a\n0,1;1,5\n0,2;2,5\n", "line 2: t: value '0,1'; allowed: a number with a decimal point"),
+        (
+            "t;a\n0,1;1,5\n0,2;2,5\n",
+            "line 2: t: value '0,1'; allowed: a number with a decimal point",
+        ),
         ("a,a\n1,2\n", "a different name for each column"),
         ("Format Version,1.2\nFrame,Time\n0,0\n", "export from Motive with all header rows"),
         ("Segments\nfast\n,,a\nFrame,Sub Frame,RX\n,,rad\n1,0,1\n", "the rate in Hz"),
