@@ -732,8 +732,9 @@ class _HeldOnError:
             elif robot._started:
                 robot.hold()
         except Error as failed:
-            if str(failed) != str(error):
-                error.add_note(f"the robot could not be stopped: {failed}")
+            note = f"the robot could not be stopped: {failed}"
+            if str(failed) != str(error) and note not in getattr(error, "__notes__", ()):
+                error.add_note(note)
 
 
 def end_text(status: Mapping[str, Any]) -> str:

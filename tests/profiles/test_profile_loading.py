@@ -232,7 +232,8 @@ def test_error_within_a_table_is_reported_with_its_place(
 
 
 def test_peak_torque_below_rated_torque_is_rejected(tmp_path: Path):
-    motor = cdpr_profiles.load_motor("MPP0923D").model_dump(mode="json") | {"peak_torque_Nm": 2.0}
+    shipped = cdpr_profiles.load_motor("MPP0923D")
+    motor = shipped.model_dump(mode="json", exclude_none=True) | {"peak_torque_Nm": 2.0}
     path = tmp_path / "weak.toml"
     path.write_text(_document(motor), encoding="utf-8")
     with pytest.raises(
@@ -285,7 +286,8 @@ def test_shipped_winch_has_its_motor_and_drive_and_moves_10_mm_per_22_degrees():
 
 
 def test_a_winch_finds_profiles_in_its_folder_before_shipped_ones(tmp_path: Path):
-    own = cdpr_profiles.load_motor("MPP0922D").model_dump(mode="json") | {"model": "mine"}
+    shipped = cdpr_profiles.load_motor("MPP0922D")
+    own = shipped.model_dump(mode="json", exclude_none=True) | {"model": "mine"}
     (tmp_path / "my-motor.toml").write_text(_document(own), encoding="utf-8")
     shutil.copy(SHIPPED / "cables" / "dyneema-4.8mm.toml", tmp_path / "rope.toml")
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"

@@ -83,6 +83,7 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) 
             assert fault.value.limit == "not_finite" and robot.state == "fault"
             assert mine.cycles == mine.fails_at  # the built-in controller has lowered the platform
             robot.acknowledge()
+            robot.inject_fault(0, "put-back")  # it was lowered where it was
 
 
 def test_a_controller_whose_reset_ends_the_process_stops_the_robot(planar_file: Path) -> None:

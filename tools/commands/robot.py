@@ -180,10 +180,10 @@ def new(
 @app.command("import")
 def import_(
     bodies: Annotated[
-        Path, typer.Argument(help="The model's file of bodies.", metavar="BODIES.xml")
+        Path, typer.Argument(help="The model's file of bodies, XML.", metavar="BODIES")
     ],
     cables: Annotated[
-        Path, typer.Argument(help="The model's file of cables.", metavar="CABLES.xml")
+        Path, typer.Argument(help="The model's file of cables, XML.", metavar="CABLES")
     ],
     path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
@@ -196,7 +196,7 @@ def import_(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a robot's file from a CASPR model: two XML files, of its bodies and its cables.
+    """Write a robot's file from a CASPR model.
 
     Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
     The platform's origin is its centre of mass, and the plane of a planar robot vertical, with y

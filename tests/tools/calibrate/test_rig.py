@@ -114,8 +114,8 @@ def test_an_emergency_stop_does_not_mark_the_pose_as_tried(
         def pressing(what: Any) -> Any:
             begun_s, turn = rig.now_s, rig.loop.turn
 
-            def press() -> None:
-                turn()
+            def press(**how: bool) -> None:
+                turn(**how)
                 if rig.now_s > begun_s + 0.3 and not pressed_s:
                     pressed_s.append(rig.now_s)
                     rig.loop.request_power_off()

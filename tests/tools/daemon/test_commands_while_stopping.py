@@ -248,7 +248,7 @@ class UnheldDaemon:
 
 
 def test_a_motion_that_cannot_be_held_at_its_end_is_not_reported_as_held() -> None:
-    with pytest.raises(WorkFailedError, match="could not be held: the service is busy"):
+    with pytest.raises(WorkFailedError, match="could not be stopped: the service is busy"):
         carry_out(
             UnheldDaemon(),  # type: ignore[arg-type]
             Output(True),
