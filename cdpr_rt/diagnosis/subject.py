@@ -24,9 +24,9 @@ class Finding:
     key: str
     text: str
     impossible: bool
-    """Whether the robot cannot work like this; otherwise it works with a restriction."""
+    """Whether the robot cannot work with this file; otherwise it works with a restriction."""
     helps: str = ""
-    """Another key whose change the text proposes, if it does."""
+    """Another key, if the text proposes to change it."""
 
 
 class Subject:
@@ -58,12 +58,12 @@ class Subject:
 
     @cached_property
     def loop(self) -> DesignedLoop:
-        """The loop that is designed for it; raises GeometryError."""
+        """The loop that is designed for the robot; raises GeometryError."""
         return designed_loop(self.model, self.axes, self.robot.sync_period_s)
 
     @cached_property
     def corner_targets(self) -> list[tuple[float, ...]]:
-        """The targets of a grid that are nearest to the corners of their box."""
+        """The targets on a grid that are nearest to the corners of the box of targets."""
         points = self.statics.points()
         targets = points[self.statics.is_target(points)]
         box = zip(self.platform.workspace_min_m, self.platform.workspace_max_m, strict=True)
