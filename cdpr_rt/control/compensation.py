@@ -67,7 +67,8 @@ def _observe(
 ) -> tuple[float, float]:
     """Return the deviation from the set-point and its rate by one axis' tracking observer.
 
-    Its `pole` is in the z-plane; with 0.0 the results are the measured deviation, and 0.0.
+    `pole` is the observer's pole in the z-plane. If it is 0.0, the results are the measured
+    deviation and 0.0.
     """
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0

@@ -57,7 +57,7 @@ class Task(Generic[_T]):
         return now_s >= self.wake_s or (self._condition is not None and bool(self._condition()))
 
     def advance(self) -> None:
-        """Run the task until it waits or ends; raises what interrupts the process."""
+        """Run the task until it waits or ends; raises exceptions that interrupt the process."""
         self._greenlet.parent = getcurrent()
         self._greenlet.switch()
 

@@ -45,7 +45,7 @@ class CycleField:
 
     @property
     def is_wall_time(self) -> bool:
-        """Whether it is a duration by the wall clock, in seconds."""
+        """Whether the quantity is a duration by the wall clock, in seconds."""
         return self.wall and self.kind == "<f8"
 
 

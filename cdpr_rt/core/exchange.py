@@ -112,7 +112,7 @@ class TensionFault(IntEnum):
 
     NONE = 0
     NO_READING = 1
-    """Nothing was read yet."""
+    """No reading has arrived yet."""
     STALE = 2
     """The last reading is too old: the sensor has stopped answering."""
     OVER_RANGE = 3

@@ -107,7 +107,7 @@ _ACTIONS: Final = (
 
 
 def fault_text(fault: Fault, names: Sequence[str]) -> str:
-    """Return a fault as text: the axis by `names`, the state, its cause and what to do."""
+    """Return a fault as text: the axis by `names`, the state, its cause and the remedy."""
     limit, code = fault.limit, fault.code
     if code in _BY_CODE:
         at = f" ({fault.source})" if fault.source else ""

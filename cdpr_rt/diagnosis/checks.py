@@ -153,7 +153,7 @@ def diagnose(robot: Robot, limits: Limits | None = None) -> list[Finding]:
 def refuse_impossible(robot: Robot, limits: Limits | None = None) -> list[str]:
     """Return doubtful properties of a robot within `limits`, as `diagnose` does, a line each.
 
-    Raises ProfileError if it is impossible: a line for each key, with what to change.
+    Raises ProfileError if the robot is impossible: a line for each key, with the change to make.
     """
     found = diagnose(robot, limits)
     wrong = [finding for finding in found if finding.impossible]

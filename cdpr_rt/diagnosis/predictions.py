@@ -334,7 +334,7 @@ class Swing:
     """The lost cable; 0 for lost lengths."""
     position_m: tuple[float, ...]
     swing_m: float
-    """Largest distance of the origin from that position within `SWING_S`."""
+    """Largest distance of the platform's origin from its initial position within `SWING_S`."""
     turn_rad: float
     """Largest angle from the initial orientation within `SWING_S`."""
     away_m: float

@@ -19,7 +19,7 @@ from cdpr_rt.platform.loop_design import DesignedLoop, designed_loop
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault or doubt about a key of a robot's file, and what to change."""
+    """A fault or doubt about a key of a robot's file, and the change to make."""
 
     key: str
     text: str
@@ -32,7 +32,7 @@ class Finding:
 class Subject:
     """A robot with a platform, within `limits`, by default those of its file.
 
-    Its winches are arrays over the axes, (n,); slow results are computed once.
+    Data of its winches are arrays over the axes, (n,). Slow results are computed once.
     """
 
     def __init__(self, robot: Robot, limits: Limits | None = None) -> None:

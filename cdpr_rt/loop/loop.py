@@ -213,7 +213,7 @@ class ControlLoop:
 
     @property
     def ended(self) -> bool:
-        """Whether it has been shut down."""
+        """Whether the loop has been shut down."""
         return self.transitions.ended
 
     def run(self) -> None:
@@ -265,7 +265,7 @@ class ControlLoop:
         )
 
     def request_stop(self) -> None:
-        """End the loop under control. For signal handlers."""
+        """End the loop with a controlled stop. For signal handlers."""
         self._stop_requested = True
 
     def request_power_off(self) -> None:

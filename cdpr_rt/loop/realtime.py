@@ -145,7 +145,7 @@ def one_core(*others: int) -> Iterator[None]:
 
 @contextmanager
 def _free_core(usable: set[int]) -> Iterator[int | None]:
-    """Claim a free core and return it, or None; the kernel frees the claim."""
+    """Claim a free core and yield it, or None; the kernel releases the claim."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         for core in sorted(usable, reverse=True):
             try:

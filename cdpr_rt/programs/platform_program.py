@@ -140,7 +140,7 @@ class PlatformParts:
         self.lengths_allowed_m = lengths_disagree_m
         """Largest allowed disagreement of the cables' lengths."""
         self.home_lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
-        """The same at home, where the error of the drums has no effect."""
+        """Largest allowed disagreement at home, where errors of the drums have no effect."""
         self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
         """Names of the cables in messages, those of their axes."""
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))

@@ -68,7 +68,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class Move:
-    """One move to a position, and what happens there."""
+    """One move to a position, with its speed and the stop or wait at its end."""
 
     line: int
     """Line in the file."""

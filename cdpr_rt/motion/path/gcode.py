@@ -151,7 +151,7 @@ class GcodeSettings:
 
 @dataclass
 class _State:
-    """Modal state; lengths in m, positions in the coordinates of the file's zero (d,)."""
+    """Modal state; lengths are in m, and positions (d,) are relative to the file's zero."""
 
     here: FloatArray
     """Present position; entries are nan before the file names them."""
