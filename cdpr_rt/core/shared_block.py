@@ -108,8 +108,7 @@ class SharedBlock:
             views.append(np.frombuffer(self._map, np.uint8, size, first))
             first += size
         self.counters: Row = views[0][: _COUNTERS.itemsize].view(_COUNTERS)
-        """One row of counters, such as `counters["rows"][0]`; comments in its type name the
-        writers."""
+        """One row of counters, such as `counters["rows"][0]`."""
         self._description, self._status = views[1], views[2]
         self._commands = views[3].reshape(MESSAGES, MESSAGE_BYTES)
         self._urgent = views[4].reshape(URGENT_MESSAGES, MESSAGE_BYTES)

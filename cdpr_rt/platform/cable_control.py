@@ -410,7 +410,7 @@ class CableControl(PlaceChecks):
         """Bind the arrays of the kernels that convert the force to tensions and torques."""
         model, motors, scale = self.model, self._motors, self.model.wrench_scale
         n, d, method = model.kinematics.n, model.size, model.platform.tension_method
-        self._distribution: TensionSolver | None = None  # used only without the split
+        self._distribution: TensionSolver | None = None  # None: `split` computes the tensions
         if method != "minimum-deviation":
             self._distribution = TensionSolver(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
