@@ -120,7 +120,7 @@ def _read(reference: str, file: Path) -> bytes:
 
 
 def _run(file: Path, source: bytes) -> ModuleType:
-    """Run a file's bytes as a new module, without the cache of compiled code beside the file."""
+    """Run a file's bytes as a new module, without using the cache of compiled code."""
     module = ModuleType(f"own_code_{file.stem}")
     module.__file__ = str(file)
     sys.modules[module.__name__] = module  # where dataclasses and pickle look for it

@@ -1,4 +1,4 @@
-"""Errors of the runtime; each message says what happened, where, and what is allowed."""
+"""Errors of the runtime; each message gives the problem, its place, and the allowed values."""
 
 
 class ControlError(Exception):

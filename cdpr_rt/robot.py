@@ -41,7 +41,8 @@ class AlreadyRunning(Error):  # noqa: N818
 class Refused(Error):  # noqa: N818
     """The robot refused a command. Nothing has changed; the message gives the reason.
 
-    `refusal` is the reason for programs, `code` its code; None if there is only the message.
+    `refusal` is the reason in a form for programs, and `code` is its code. Both are None if there
+    is only the message.
     """
 
     def __init__(self, text: str, refusal: CommandRefusal | None = None) -> None:
@@ -325,10 +326,9 @@ class Robot:
     def log(self, *fields: str) -> Log:
         """Return the recorded cycles since the handle was opened: a structured array, (cycles,).
 
-        `fields` are those of the recordings, such as "time_s", "pose" (7,) and "tension_N" (n,);
-        all by default.
-        A simulation keeps the last 5 minutes. A daemon's rows come from its recording on this
-        machine. Raises Error if the daemon records nothing.
+        `fields` are names of recorded fields, such as "time_s", "pose" (7,) and "tension_N" (n,);
+        by default all fields. A simulation keeps the last 5 minutes. A daemon's rows come from its
+        recording on this machine. Raises Error if the daemon records nothing.
         """
         if unknown := set(fields) - FIELDS.keys():
             raise InvalidArgument(f"fields: {sorted(unknown)}; allowed: {', '.join(FIELDS)}")

@@ -233,7 +233,7 @@ class CalibrationChange:
     moved_m: float
     """Root mean square of the displacements of positions in the workspace."""
     turned_rad: float
-    """The same for orientations; 0 if they are not estimated."""
+    """Root mean square of the rotations; 0 if orientations are not estimated."""
     chi_squared: float
     degrees_of_freedom: float
     """Number of parameters that observations determine: the mean of chi squared if the file is

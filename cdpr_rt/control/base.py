@@ -9,7 +9,7 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 
 
 class Controller(Protocol):
-    """Turns feedback and set-point into torques, once per cycle."""
+    """Computes torques from feedback and set-point, once per cycle."""
 
     effort_Nm: FloatArray
     """Torque of the feedback loop in this cycle, (n,)."""
@@ -21,7 +21,7 @@ class Controller(Protocol):
     """Cogging: the part of `motor_loss_Nm` whose mean over a motor turn is 0, (n,)."""
 
     def reset(self) -> None:
-        """Forget the past, before a motion starts."""
+        """Discard the internal state before a motion starts."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the torque to command for each axis, (n,), Nm."""

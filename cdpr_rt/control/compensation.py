@@ -31,7 +31,7 @@ class FrictionFeedforward:
 
     coulomb_forward_Nm: float = 0.0
     coulomb_backward_Nm: float = 0.0
-    """Magnitude while the angle decreases."""
+    """Coulomb friction while the angle decreases, as a magnitude."""
     stribeck_forward_Nm: float = 0.0
     stribeck_backward_Nm: float = 0.0
     stribeck_speed_rad_s: float = 1.0
@@ -43,12 +43,12 @@ class AxisCompensation:
     """Compensation of one axis: tables (2, m) in Nm over the turn from the index, and timing.
 
     `table_Nm[0]` is for increasing angles, `table_Nm[1]` for decreasing ones; sample j lies at
-    2π·j/m from the index. `look_ahead_s` is the time from the instant an angle was true to the
-    mean instant at which the torque computed from it acts. Angle and velocity are the set-point's
-    plus the deviation from it and the deviation's rate, both from a tracking observer with a double
-    pole of time constant `observer_s` (0: the encoder's reading and the set-point's velocity).
-    Friction is evaluated at that velocity, for the set-point's direction. If it falls with speed,
-    this removes the negative damping that makes a rotor stick and slip.
+    2π·j/m from the index. `look_ahead_s` is the time from the sampling of an angle to the mean time
+    at which the torque computed from it acts. Angle and velocity are the set-point's plus the
+    deviation from it and the deviation's rate, both from a tracking observer with a double pole of
+    time constant `observer_s` (0: the encoder's reading and the set-point's velocity). Friction is
+    evaluated at that velocity, for the set-point's direction. If it falls with speed, this removes
+    the negative damping that makes a rotor stick and slip.
     """
 
     table_Nm: FloatArray
@@ -58,7 +58,7 @@ class AxisCompensation:
     look_ahead_s: float = 0.0
     observer_s: float = 0.0
     blend_speed_rad_s: float = 0.02
-    """Set-point speed above which one direction's table counts alone."""
+    """Set-point speed above which only the table of that direction is used."""
 
 
 @jit
@@ -67,7 +67,8 @@ def _observe(
 ) -> tuple[float, float]:
     """Return the deviation from the set-point and its rate by one axis' tracking observer.
 
-    Its `pole` is in the z-plane; with 0.0 the results are the measured deviation, and 0.0.
+    `pole` is the observer's pole in the z-plane. If it is 0.0, the results are the measured
+    deviation and 0.0.
     """
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
@@ -84,7 +85,7 @@ def _observe(
 
 @jit
 def _interpolated(tables: FloatArray, i: int, angle: float) -> tuple[float, float]:
-    """Return the torques of an axis' table at an angle from the index, for either direction."""
+    """Return the torques in an axis' table at an angle from the index, for both directions."""
     size = tables.shape[2]
     place = (angle / TWO_PI - math.floor(angle / TWO_PI)) * size
     low = int(place)
@@ -135,7 +136,7 @@ def _torque(
         total = 0.5 * (1.0 + side) * forward + 0.5 * (1.0 - side) * backward
         total += parameters[i, _VISCOUS] * moving
         bound = parameters[i, _BOUND]
-        # written so that nan stays nan: the supervisor checks for it
+        # written so that nan stays nan, which the supervisor checks
         if total > bound:
             total = bound
         elif total < -bound:
@@ -200,14 +201,14 @@ class Compensation:
         self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
-        """Fade in again and forget the deviation from the set-point."""
+        """Fade in again and discard the deviation from the set-point."""
         self._state[:] = 0.0
 
     def standing_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
         """Return the torque lost in motors at rest at these angles, (n,), mean of both directions.
 
-        That is cogging, and half of the difference in friction. 0 if there is no profile or no
-        index is known.
+        It is cogging plus half of the difference in friction. It is 0 without a profile or a known
+        index.
         """
         angle = np.where(feedback.index_known, position_rad - feedback.index_rad, 0.0)
         size = self._tables.shape[2]

@@ -18,7 +18,7 @@ _RUNNING, _BUMPLESS_START = 1.0, 2.0
 # filter time of speed and share followed, and how long the share is kept after the motion:
 # friction continues to creep while the rotor comes to rest
 _SPEED_S, _FOLLOWS_S, _KEPT_S = 0.05, 0.05, 1.0
-# slower set-points count as standing, or they would follow a reading that flickers by a count
+# slower set-points count as standing; they might only follow a reading that flickers by a count
 _STANDS_RAD_S = 0.05
 # a larger error has no more effect: it comes from a swinging load, not friction and cogging
 _MOST_FOLLOWING_RAD = math.radians(1.0)
@@ -33,14 +33,15 @@ class PidGains:
     derivative_Nms_rad: float
     derivative_filter_s: float
     following_Nm_rad_s: float = 0.0
-    """Added to the integral gain, times the share of the set-point's motion that is followed."""
+    """Addition to the integral gain, multiplied by the share of the set-point's motion that is
+    followed."""
 
 
 @jit
 def _follow(state: FloatArray, period: float, position: float, speed: float) -> float:
     """Return the share of the set-point's speed that an axis follows, 0 to 1; `state` is (3,).
 
-    It is 0 for an axis that something blocks, whatever the set-point does.
+    It is 0 for a blocked axis, even if the set-point moves.
     """
     state[1] += ((position - state[0]) / period - state[1]) * period / (_SPEED_S + period)
     state[0] = position
@@ -73,7 +74,7 @@ def _update(
             state[i, 4] = position[i]
             state[i, 5] = state[i, 6] = 0.0
             if state[i, 3] == _BUMPLESS_START:
-                # the integral provides what the error and the feed-forward torque do not
+                # the integral provides the torque that the error and the feed-forward torque do not
                 state[i, 0] -= (kp + ki * period) * error + feedforward[i]
             state[i, 3] = _RUNNING
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
@@ -100,10 +101,10 @@ def _update(
 class Pid:
     """PID on position plus an optional compensation, saturated (Tremblay, figure 1.8).
 
-    The derivative is filtered by a first-order lag (backward difference); integration stops
-    while it would drive the torque further beyond its limit. While an axis follows a moving
-    set-point, and shortly after, the integral may be quicker to keep up with cogging and friction;
-    a blocked axis does not count as following. Shapes: `gains` one per axis, `limit_Nm` (n,).
+    The derivative is filtered by a first-order lag (backward difference); integration stops while
+    it would drive the torque further beyond its limit. While an axis follows a moving set-point,
+    and shortly after, the integral may be faster, to keep up with cogging and friction; a blocked
+    axis does not count as following. Shapes: `gains` one per axis, `limit_Nm` (n,).
     """
 
     def __init__(
@@ -144,8 +145,8 @@ class Pid:
     def take_over(self, torque_Nm: FloatArray) -> None:
         """Restart so that the first `update` writes the torques (n,), within the limits.
 
-        The integral compensates for any error at that time, so a controller that held a load is
-        followed by one that holds it.
+        The integral compensates for any error at that time, so the new controller holds the load
+        that the previous one held.
         """
         self.reset()
         self._state[:, 0] = torque_Nm

@@ -45,9 +45,10 @@ class PidDesign:
     crossover_Hz: float
     phase_margin_deg: float
     gain_margin_dB: float
-    """Upwards, towards instability from more gain."""
+    """Gain margin upwards: increase of the gain that makes the loop unstable."""
     gain_reduction_dB: float
-    """Downwards: reduction of the gain at which integral action makes the loop unstable."""
+    """Gain margin downwards: reduction of the gain at which integral action makes the loop
+    unstable."""
     sensitivity_peak: float
 
 
@@ -67,8 +68,8 @@ def loop_response(
     """Return the open loop's frequency response at `omega` (k,), rad/s.
 
     The controller is the sampled one, term by term; the plant 1/(J s²) is driven through a
-    zero-order hold. `latency_s` is from the instant an angle was true to the middle of the cycle
-    in which its torque acts, so it already includes half a period of the hold.
+    zero-order hold. `latency_s` is the time from the sampling of an angle to the middle of the
+    cycle in which its torque acts, so it already includes half a period of the hold.
     """
     back = np.exp(-1j * omega * period_s)
     slope = (1.0 - back) / (gains.derivative_filter_s + period_s - gains.derivative_filter_s * back)
@@ -128,9 +129,9 @@ def analyse(
 def stiffest_pid(
     inertia_kg_m2: float, latency_s: float, bandwidths_Hz: Sequence[float], period_s: float
 ) -> PidDesign:
-    """Return the PID of the first of some bandwidths, highest first, that keeps its margins.
+    """Return the PID with the highest of some bandwidths that keeps the margins.
 
-    Raises TuningError, with the possible margins, if none does.
+    Raises TuningError, with the possible margins, if no bandwidth does.
     """
     for bandwidth in bandwidths_Hz[:-1]:
         with contextlib.suppress(TuningError):
@@ -252,7 +253,7 @@ def _at_crossover(
 
 
 def _falling(x: FloatArray, y: FloatArray, level: float) -> float | None:
-    """Return where y last falls through the level, None if it does not."""
+    """Return the x at which y last falls through the level, or None."""
     places = np.flatnonzero((y[:-1] >= level) & (y[1:] < level))
     if not places.size:
         return None

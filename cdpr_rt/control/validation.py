@@ -40,7 +40,7 @@ def low_pass_velocity(angle_rad: FloatArray, period_s: float) -> FloatArray:
     """Return the velocity of angles (k,) through the zero-phase 50 Hz low-pass, rad/s.
 
     A Butterworth filter of second order, run forward and backward: 1/(1 + (f/50 Hz)⁴). It is
-    applied to the spectrum of the velocity and its mirror image, so that the ends stay put.
+    applied to the spectrum of the velocity and its mirror image, so that the ends do not change.
     """
     velocity = np.gradient(angle_rad, period_s)
     both = np.concatenate([velocity, velocity[::-1]])
@@ -57,11 +57,11 @@ def evaluate(
     period_s: float,
     judged: BoolArray | None = None,
 ) -> ValidationMetrics:
-    """Judge one run in one direction.
+    """Evaluate one run in one direction.
 
     All arrays have shape (k,); `effort_Nm` is the torque of the PID alone. `judged` marks the
-    samples that count, whole turns after the lead-in; the low-pass uses the others too.
-    Raises ControlError for arrays of different length or if no sample counts.
+    samples to evaluate, whole turns after the lead-in; the low-pass uses the others too. Raises
+    ControlError for arrays of different length or if no sample is marked.
     """
     sizes = {a.size for a in (angle_rad, setpoint_rad, setpoint_velocity_rad_s, effort_Nm)}
     if len(sizes) != 1:
@@ -93,7 +93,7 @@ def worst(runs: list[ValidationMetrics]) -> ValidationMetrics:
 
 
 def ratios(without: ValidationMetrics, having: ValidationMetrics) -> Ratios:
-    """Return how many times smaller each figure is with compensation than without."""
+    """Return the factor by which compensation reduces each figure."""
 
     def divide(a: float, b: float) -> float:
         return a / b if b > 0.0 else math.inf

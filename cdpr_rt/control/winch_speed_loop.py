@@ -18,15 +18,17 @@ FIXED_END_1_s = 60.0
 HANGING_LOAD_1_s = 4.0
 """Integral rate under a load ten times the rotor's mass at the cable, without oscillation."""
 UNKNOWN_POSE_m_s = 0.15
-"""Speed at which the cables lower a platform whose pose is not known."""
+"""Speed at which the cables lower a platform of unknown pose."""
 FASTEST_IN_m_s = 0.5
 """Highest speed at which they wind in slack during that lowering."""
 DRUM_TENSION_SHARE = 0.25
-"""Tension that keeps a cable on its drum during that lowering, over the least tension."""
+"""Tension that keeps a cable on its drum during that lowering, as a share of the least tension."""
 SPARE_m = 0.05
-"""Cable paid out there in addition to what the stand needs: the largest lag of a platform."""
+"""Cable paid out in addition to the length that reaches the stand: the largest lag of a
+platform."""
 PUSH_SHARE = 2.0
-"""Push that turns a winch outwards against its friction, over its largest usual friction."""
+"""Push that turns a winch outwards against friction, as a multiple of its largest usual
+friction."""
 
 
 @jit

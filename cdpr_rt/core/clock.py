@@ -1,4 +1,4 @@
-"""A robot's only clock: the time, waiting for it, and the tasks that share its thread."""
+"""A robot's only clock: the time, all waiting, and the tasks that share its thread."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ class TaskCancelled(BaseException):
 
 
 class Task(Generic[_T]):
-    """One call of `work` with its own stack; `Clock.start` makes tasks and advances them."""
+    """One call of `work` with its own stack; `Clock.start` creates tasks, and waits advance
+    them.
+    """
 
     def __init__(self, work: Callable[[], _T]) -> None:
         self.done = False
         """Whether the call has returned, or was cancelled."""
         self.wake_s = -math.inf
-        """Latest time at which it continues, by its clock."""
+        """Latest time at which the task continues, by its clock."""
         self._condition: Condition | None = None
         self._work = work
         self._result: Any = None
@@ -44,7 +46,7 @@ class Task(Generic[_T]):
             self._result = self._work()
         except (Exception, TaskCancelled) as error:
             self._error = error
-        except BaseException as error:  # an interrupt is for the caller that advances the tasks
+        except BaseException as error:  # the caller that advances the tasks handles interrupts
             self._error = error
             raise
         finally:
@@ -55,7 +57,7 @@ class Task(Generic[_T]):
         return now_s >= self.wake_s or (self._condition is not None and bool(self._condition()))
 
     def advance(self) -> None:
-        """Run the task until it waits or ends; raises what interrupts the process."""
+        """Run the task until it waits or ends; raises exceptions that interrupt the process."""
         self._greenlet.parent = getcurrent()
         self._greenlet.switch()
 
@@ -73,11 +75,11 @@ class Task(Generic[_T]):
         if self._greenlet:
             self._greenlet.parent = getcurrent()
             self._greenlet.throw(TaskCancelled)
-        else:  # it has not begun
+        else:  # the task has not begun
             self._error, self.done = TaskCancelled(), True
 
     def result(self) -> _T:
-        """Return what the call returned, or raise what it raised; the task has ended."""
+        """Return the result of the ended call, or raise its exception."""
         if self._error is not None:
             raise self._error
         return cast(_T, self._result)
@@ -86,13 +88,13 @@ class Task(Generic[_T]):
 _BLOCKING_POLL_S = 0.002
 """Period of polling work in another thread."""
 _MADE_UP_S = 0.02
-"""Largest lag of simulated time behind wall-clock time that is made up for."""
+"""Largest lag of simulated time behind wall-clock time that the clock catches up."""
 _LONGEST_GRANT_S = 0.1
 """Longest step of bus time, so that a request to end is noticed in between."""
 
 
 class Readable(Protocol):
-    """Object with a file descriptor to wait for."""
+    """Object with a file descriptor that can be waited for."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when something has arrived."""
@@ -102,10 +104,10 @@ class EventSource(Readable, Protocol):
     """Source of events, such as a port on a bus; none of its methods waits."""
 
     def poll(self) -> bool:
-        """Process what has arrived; return whether there was anything."""
+        """Process all events that have arrived; return whether there was any."""
 
     def tick(self, now_s: float) -> float:
-        """Do what is due at `now_s`; return the latest time of the next call."""
+        """Carry out the work due at `now_s`; return the latest time of the next call."""
 
 
 class SteppedBus(Protocol):
@@ -115,10 +117,10 @@ class SteppedBus(Protocol):
     next_s: float
     """Time of the next known event on the bus."""
     gone: bool
-    """Whether the bus is lost, and its time with it."""
+    """Whether the bus, and with it its time, is lost."""
 
     def go(self, until_s: float) -> bool:
-        """Make the bus process what was sent, then advance to `until_s` or until a frame arrives.
+        """Make the bus process all sent frames, then advance to `until_s` or until a frame arrives.
 
         Stores the frames that arrive; returns whether there were any. With a time in the past the
         bus does not advance, but it answers everything that was sent.
@@ -128,9 +130,9 @@ class SteppedBus(Protocol):
 class Clock(ABC):
     """The time of one robot, used by everything in its process that measures time.
 
-    All waiting happens here. In a task it suspends the task for the others; elsewhere it polls the
-    sources and advances the tasks, in the order in which they were started. For one thread only,
-    which is the only one that touches a bus.
+    All waiting happens here. A wait in a task suspends that task so that others can run. Any other
+    wait polls the sources and advances the tasks in the order in which they were started. Only one
+    thread may use the clock, the same that uses the buses.
     """
 
     lockstep = False
@@ -197,7 +199,7 @@ class Clock(ABC):
     def _wait_once(self, until_s: float) -> None:
         due_s = self._tick()
         if self._advance():
-            until_s = self.now_s  # the condition may have become true
+            until_s = self.now_s  # return soon, because the condition may have become true
         self._listen(min([until_s, due_s, *(task.wake_s for task in self._tasks)]))
 
     def _tick(self) -> float:
@@ -210,7 +212,7 @@ class Clock(ABC):
 
     @abstractmethod
     def sleep_until(self, until_s: float) -> None:
-        """Do nothing until then, so that events do not affect a cycle's deadline."""
+        """Do nothing until `until_s`, so that events do not affect a cycle's deadline."""
 
     # -- tasks
 
@@ -247,13 +249,13 @@ class Clock(ABC):
         return bool(self._tasks)
 
     def run_tasks(self) -> None:
-        """Run every task that can continue, without waiting; for one call per cycle."""
+        """Run every task that can continue, without waiting; called once per cycle."""
         now_s = self.now_s
         for source in self._sources:
             source.tick(now_s)
         if self._tasks:
             self._advance()
-            # what they have sent must be answered before the next SYNC goes out on any bus
+            # frames sent by tasks must be answered before the next SYNC goes out on any bus
             self._listen(self.now_s)
 
     def _advance(self) -> bool:
@@ -261,7 +263,7 @@ class Clock(ABC):
         if self._running is not None or not self._tasks:
             return False
         now_s, ran = self.now_s, False
-        for task in self._tasks:  # tasks started meanwhile have their turn too
+        for task in self._tasks:  # this includes tasks that are started during the loop
             if not task.done and task.is_due(now_s):
                 self._running, ran = task, True
                 try:
@@ -272,9 +274,10 @@ class Clock(ABC):
         return ran
 
     def run_blocking(self, work: Callable[[], _T]) -> _T:
-        """Return the result of `work`, which touches no bus and may take long, such as file access.
+        """Run `work`, which may take long and uses no bus, such as file access; return its result.
 
-        Runs in another thread in wall-clock time, else immediately: simulated time stands still.
+        In wall-clock time it runs in another thread. Otherwise it runs immediately, because
+        simulated time stands still.
         """
         return work()
 
@@ -293,13 +296,13 @@ class PacedClock(Clock):
         return time.monotonic()
 
     def sleep_until(self, until_s: float) -> None:
-        """Sleep until then."""
+        """Sleep until `until_s`."""
         left_s = until_s - time.monotonic()
         if left_s > 0.0:
             time.sleep(left_s)
 
     def await_readable(self, source: Readable, until_s: float) -> None:
-        """Wait until there is something to read from `source`, at most until `until_s`."""
+        """Wait until `source` is readable, at most until `until_s`."""
         select.select([source], [], [], max(until_s - self.now_s, 0.0))
 
     def _listen(self, until_s: float) -> None:
@@ -315,11 +318,13 @@ class PacedClock(Clock):
                 source.poll()
 
     def run_blocking(self, work: Callable[[], _T]) -> _T:
-        """Return the result of `work`, run in another thread on all cores the process may use."""
+        """Run `work` in another thread, on all cores that the process may use; return its
+        result.
+        """
         future: Future[_T] = Future()
 
         def run() -> None:
-            with suppress(OSError):  # cores may have been taken away since
+            with suppress(OSError):  # the process may have lost some of these cores
                 os.sched_setaffinity(0, self._cores)
             try:
                 future.set_result(work())
@@ -333,7 +338,7 @@ class PacedClock(Clock):
 
 
 class LockstepClock(Clock):
-    """The time of simulated buses which this process leads; it advances only in waits.
+    """The time of simulated buses that this process leads; it advances only in waits.
 
     All buses are kept at the same instant. Without any bus, time passes as soon as something waits.
     With `real_time` it is no faster than wall-clock time: if the process is delayed, time is slower
@@ -363,7 +368,7 @@ class LockstepClock(Clock):
         return max([self._alone_s, *(bus.now_s for bus in buses)])
 
     def sleep_until(self, until_s: float) -> None:
-        """Advance time until then."""
+        """Advance time until `until_s`."""
         self.wait(None, until_s)
 
     def run_tasks(self) -> None:
@@ -373,7 +378,9 @@ class LockstepClock(Clock):
             self._await_wall()
 
     def _await_wall(self) -> None:
-        """Wait until wall-clock time has caught up; only a small lag behind it is made up for."""
+        """Wait until wall-clock time has caught up; if it is ahead, only a small lag is caught
+        up.
+        """
         if not self._real_time:
             return
         now_s, wall_s = self.now_s, time.monotonic()
@@ -397,7 +404,9 @@ class LockstepClock(Clock):
             source.poll()
 
     def _go_together(self, until_s: float) -> None:
-        """Advance all buses to the next event of any, so that none is ahead of another's frames."""
+        """Advance all buses to the next event of any bus, so that no bus is ahead of another's
+        frames.
+        """
         came = [bus.go(0.0) for bus in self._buses]
         now_s = self.now_s
         if any(came) or until_s <= now_s:

@@ -15,12 +15,14 @@ _TOO_LATE_SHARE = 0.25
 
 
 class Watch(Protocol):
-    """Something other than the axes that may end their motion, such as safety I/O."""
+    """Source other than the axes that may end their motion, such as safety I/O."""
 
     def fault(self) -> Fault | None:
-        """Return why the motion must end, None if it need not; cheap, called every cycle.
+        """Return the fault that must end the motion, or None; called in every cycle, so it must be
+        fast.
 
-        Its limit is `SAFETY_ALARM` if the torque must be removed immediately, else `SAFETY_STOP`.
+        The limit of the fault is `SAFETY_ALARM` if the torque must be removed immediately, else
+        `SAFETY_STOP`.
         """
 
 
@@ -35,7 +37,7 @@ class Lateness:
 
 
 class Cycle:
-    """Exchanges a device once a cycle and sends one command in each.
+    """Exchanges data with a device, and sends one command, in each cycle.
 
     On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each SYNC
     has an absolute deadline.
@@ -50,7 +52,7 @@ class Cycle:
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self.elapsed_s = device.period_s
-        """From the last SYNC to this one; one period in lockstep and in the first cycle."""
+        """Time from the last SYNC to this one; one period in lockstep and in the first cycle."""
         self._no_elapsed_yet = True
         self._deadline_s = 0.0
         self._no_deadline_yet = True
@@ -58,7 +60,7 @@ class Cycle:
         """Latest time at which the last cycle's commands are off the wire."""
 
     def begin(self) -> None:
-        """Note that no cycles have run for a while, so that the next one does not count as late."""
+        """Begin after a pause of the cycles, so that the next cycle does not count as late."""
         self._no_deadline_yet = self._no_elapsed_yet = True
 
     def exchange(self) -> int:
@@ -70,14 +72,14 @@ class Cycle:
         return self.device.receive()
 
     def transmit(self) -> None:
-        """Send the command as it stands, and close the cycle."""
+        """Send the command, and close the cycle."""
         device = self.device
         device.transmit()
         if not device.lockstep:
             self._free_s = device.clock.now_s + device.commands_s
 
     def watch_faults(self) -> list[Fault]:
-        """Return why the motion must end, for causes other than the axes."""
+        """Return the faults, from sources other than the axes, that must end the motion."""
         return [fault for watch in self.watches if (fault := watch.fault()) is not None]
 
     def _measure_elapsed(self) -> None:
@@ -89,8 +91,8 @@ class Cycle:
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
-        # a SYNC that met commands on the wire would be late, and so would all after it; if that
-        # happens in every cycle, as with a silent drive, the rate is kept all the same
+        # a SYNC that meets commands on the wire is late, and delays all later ones; if this happens
+        # in every cycle, as with a silent drive, the cycle rate must still be kept
         too_late_s = _TOO_LATE_SHARE * period
         begin_s = min(max(self._deadline_s, self._free_s), self._deadline_s + too_late_s)
         now = clock.now_s
@@ -102,7 +104,7 @@ class Cycle:
         self._no_deadline_yet = False
         self.late_s = now - self._deadline_s
         if now - begin_s > too_late_s:
-            self._deadline_s = now  # a new time base: the next cycles do not catch up
+            self._deadline_s = now  # new time base, so that the next cycles do not catch up
         lateness = self.lateness
         lateness.cycles += 1
         lateness.late += self.late_s > _LATE_SHARE * period

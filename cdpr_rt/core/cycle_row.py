@@ -1,7 +1,7 @@
-"""One cycle as a row of fixed size: all its values that are recorded, shown or streamed.
+"""One cycle as a row of fixed size: all values that are recorded, shown or streamed.
 
-A quantity is declared only here: the row's type, its source, recordings, their schemas, the
-status, the live view and the metrics follow from these tables.
+Each quantity is declared only here. The type of the row, its sources, recordings and their schemas,
+the status, the live view and the metrics are derived from these tables.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ class CycleField:
     kind: str
     """Type of one value, as numpy writes it."""
     source: str
-    """Path of attributes to its value, from the engine."""
+    """Path of attributes from the engine to the value."""
     meaning: str
     wall: bool = False
-    """Whether it depends on the machine that runs the loop; all other quantities follow from the
-    bus."""
+    """Whether the quantity depends on the computer that runs the loop; all others are determined by
+    the bus."""
     status: bool = False
     """Whether the status shows it for each axis; scalars are always shown."""
     live: bool = False
-    """Whether the live view shows it: angles in degrees, the longest of each wall time in ms."""
+    """Whether the live view shows it: angles in degrees, wall times as the longest one in ms."""
     metric: str = ""
-    """Name in Prometheus without prefix, "" for none; wall times are histograms."""
+    """Name of the Prometheus metric without prefix, "" for none; wall times are histograms."""
     labels: type[LoopState] | type[Reaction] | None = None
-    """Enumeration of its numbers."""
+    """Enumeration that names its numbers."""
 
     @property
     def is_wall_time(self) -> bool:
-        """Whether it is a duration by the wall clock, in seconds."""
+        """Whether the quantity is a duration by the wall clock, in seconds."""
         return self.wall and self.kind == "<f8"
 
 
@@ -287,7 +287,7 @@ POSE_FIELDS: Final = (
 """Seven values, nan if they are not known."""
 
 FIELDS: Final = {field.name: field for field in (*SCALAR_FIELDS, *AXIS_FIELDS, *POSE_FIELDS)}
-"""All fields of a row by name, in its order."""
+"""All fields of a row by name, in the order of the row."""
 SCALARS: Final = tuple(field.name for field in SCALAR_FIELDS)
 AXES: Final = tuple(field.name for field in AXIS_FIELDS)
 POSES: Final = tuple(field.name for field in POSE_FIELDS)

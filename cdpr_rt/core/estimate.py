@@ -14,9 +14,10 @@ from cdpr_rt.core.exchange import AxisFeedback, TensionFeedback
 from cdpr_rt.jit import bound, bound_to, jit
 
 FILTER_S = 0.01
-"""Filter time of speed and torque: unfiltered, one encoder step per cycle is a high speed."""
+"""Filter time of speed and torque; without it, one encoder step per cycle would look like a high
+speed."""
 _AT_ONCE_S = 0.001
-"""Filter time for a tension that rises within some ms."""
+"""Filter time for detecting a tension that rises within some ms."""
 _FRICTION_FULL_rad_s = 0.1
 _M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
 """The rows of `WinchArrays.table`."""
@@ -24,10 +25,10 @@ _M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
 _STATE = np.dtype(
     [
         ("position", "<f8"),
-        ("torque", "<f8"),  # low-passed, without the part that turns the motor alone
-        ("elapsed", "<f8"),  # since the last valid position
+        ("torque", "<f8"),  # low-passed, without the torque for the motor itself
+        ("elapsed", "<f8"),  # time since the last valid position
         ("started", "<f8"),
-        ("fast_velocity", "<f8"),  # of the motor, low-passed lightly
+        ("fast_velocity", "<f8"),  # velocity of the motor, low-passed lightly
         ("length_at_zero", "<f8"),  # cable length at motor angle 0; nan if unknown
     ]
 )
@@ -37,8 +38,8 @@ _STATE = np.dtype(
 class WinchArrays:
     """Parameters of n winches for the estimate; shapes are (n,).
 
-    Winding torque = gain·tension + bias ± (friction + friction_per_N·tension), plus while the
-    cable is wound in, as in a winch's calibration.
+    Winding torque = gain·tension + bias ± (friction + friction_per_N·tension), as in a winch's
+    calibration. The sign is + while the cable is wound in.
     """
 
     cable_m_per_rad: FloatArray
@@ -49,11 +50,11 @@ class WinchArrays:
     friction_Nm: FloatArray
     friction_per_N_m: FloatArray
     inertia_kg_m2: FloatArray
-    """Inertia that the motor accelerates, without the cable."""
+    """Inertia that the motor accelerates, without the load of the cable."""
 
     @classmethod
     def bare(cls, n: int) -> WinchArrays:
-        """Return n motors without a cable."""
+        """Return the parameters of n motors without cables."""
         return cls(*(np.zeros(n) for _ in range(6)))
 
     def table(self) -> FloatArray:
@@ -76,23 +77,24 @@ class AxisEstimate:
 
     def __init__(self, n: int) -> None:
         self.elapsed_s = 0.0
-        """From the last SYNC to this one."""
+        """Time from the last SYNC to this one."""
         self.velocity_rad_s: FloatArray = np.zeros(n)
         self.cable_m_per_rad: FloatArray = np.zeros(n)
         self.cable_length_m: FloatArray = np.full(n, np.nan)
-        """Length beyond the drum, by the cable wound off; nan if it is not known."""
+        """Length of cable off the drum; nan if it is not known."""
         self.length_known: BoolArray = np.zeros(n, np.bool_)
         self.tension_N: FloatArray = np.full(n, np.nan)
-        """Measured, or estimated from the torque; nan if neither is possible."""
+        """Tension, measured or estimated from the torque; nan if neither is possible."""
         self.tension_at_once_N: FloatArray = np.full(n, np.nan)
-        """The same from the torque, filtered over only 1 ms: noisy, but it shows a snatch."""
+        """Tension from the torque, filtered over only 1 ms: noisy, but it shows a snatch load."""
         self.slack_allowed = False
-        """Whether cables are being tightened or slackened, so that a slack one is no fault."""
+        """Whether cables are being tightened or slackened, so that a slack cable is not a fault."""
         self.tension_measured: BoolArray = np.zeros(n, np.bool_)
         self.sensor_ok: BoolArray = np.ones(n, np.bool_)
-        """False if there is a tension sensor whose reading is not valid."""
+        """Whether tension sensors are valid: False if the reading of an existing sensor is
+        invalid."""
         self.upward: FloatArray = np.zeros(4)
-        """As in `TensionFeedback`."""
+        """Reading of the inclinometer, as in `TensionFeedback`."""
 
 
 @jit
@@ -115,7 +117,7 @@ def _update(
         state["elapsed"] += elapsed
         if not valid[i]:
             continue
-        # a measured friction of the winch includes the motor's, but not its cogging
+        # the measured friction of a winch includes the friction of the motor, but not its cogging
         net_torque = torque[i] - (loss[i] if winch[_FRICTION, i] == 0.0 else cogging[i])
         if state["started"] == 0.0:
             state["position"], state["torque"] = position[i], net_torque
@@ -165,13 +167,14 @@ def _take_sensors(
 class Estimator:
     """Updates an `AxisEstimate` once per cycle; allocates nothing.
 
-    Readings of tension are those of the first axes.
+    The tension readings belong to the first axes.
     """
 
     def __init__(self, n: int, period_s: float, winches: WinchArrays | None = None) -> None:
         self.estimate = AxisEstimate(n)
         self.origins_lost = 0
-        """Number of times that lengths were forgotten because the angles' origins were lost."""
+        """Number of times that lengths were discarded because the origins of the angles were
+        lost."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
         self.estimate.cable_m_per_rad[:] = self._winch[_M_PER_RAD]
@@ -181,7 +184,7 @@ class Estimator:
         self._kernel = bound_to(self._bind)
 
     def reset(self) -> None:
-        """Forget speeds, torques and tensions after a pause of the cycles; lengths stay known."""
+        """Discard speeds, torques and tensions after a pause of the cycles; lengths stay known."""
         for field in ("position", "torque", "elapsed", "started"):
             self._state[field] = 0.0
         self.estimate.velocity_rad_s[:] = 0.0
@@ -195,7 +198,7 @@ class Estimator:
         return np.asarray(self._state["position"])
 
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
-        """Set the cables' lengths (n,) at these motor angles; nan leaves one as it is."""
+        """Set the cable lengths (n,) at these motor angles; a length with nan does not change."""
         for i, length in enumerate(length_m):
             if math.isfinite(length) and self._winch[_M_PER_RAD, i] != 0.0:
                 self._state["length_at_zero"][i] = (
@@ -220,9 +223,9 @@ class Estimator:
     ) -> None:
         """Process this cycle's feedback and the last tension readings.
 
-        `elapsed_s` is from the last SYNC to this one, if it was not one period; `motor_loss_Nm`
-        (n,) is the part of the torque for the motors' own cogging and friction, `cogging_Nm` (n,)
-        the part for cogging alone.
+        `elapsed_s` is the time from the last SYNC to this one, one period by default.
+        `motor_loss_Nm` (n,) is the part of the torque that compensates the motors' own cogging and
+        friction, `cogging_Nm` (n,) the part for cogging alone.
         """
         estimate = self.estimate
         estimate.elapsed_s = elapsed_s or self._period_s

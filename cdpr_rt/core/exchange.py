@@ -35,9 +35,10 @@ class AxisFeedback:
         self.valid: BoolArray = np.zeros(n, np.bool_)
         """Whether the axis answered this SYNC."""
         self.alive: BoolArray = np.zeros(n, np.bool_)
-        """Whether its drive was heard and operational at the end of the last cycle."""
+        """Whether the drive answered and was operational at the end of the last cycle."""
         self.rate_ok: BoolArray = np.zeros(n, np.bool_)
-        """Whether it answers once per SYNC: to the last one, and to nearly all before it."""
+        """Whether the drive answers once per SYNC: to the last SYNC, and to nearly all before
+        it."""
         self.index_rad: FloatArray = np.zeros(n)
         self.index_known: BoolArray = np.zeros(n, np.bool_)
 
@@ -48,7 +49,7 @@ class AxisCommand:
     def __init__(self, n: int) -> None:
         self.torque_Nm: FloatArray = np.zeros(n)
         self.sent_torque_Nm: FloatArray = np.zeros(n)
-        """Torque that went out after quantisation to the drive's unit; written by the device."""
+        """Torque that was sent after quantisation to the drive's unit; written by the device."""
 
 
 class Setpoint:
@@ -62,7 +63,7 @@ class Setpoint:
 
 
 class AxisDevice(Protocol):
-    """A group of n axes exchanged once per cycle.
+    """A group of n axes with one exchange per cycle.
 
     Order in a cycle: `sync`, `receive`, then the controller writes `command`, then `transmit`.
     """
@@ -72,7 +73,7 @@ class AxisDevice(Protocol):
     lockstep: bool
     """Whether the next SYNC goes out as soon as the last one has been answered."""
     commands_s: float
-    """Longest time that the commands of a cycle are on the wire, on the slowest bus."""
+    """Longest time for which the commands of a cycle are on the wire, on the slowest bus."""
     feedback: AxisFeedback
     command: AxisCommand
 
@@ -90,19 +91,20 @@ class AxisDevice(Protocol):
         """Encode `command` and send it, to act from the next SYNC on."""
 
     def sync_ahead(self) -> None:
-        """Send the next cycle's SYNC after `transmit`: the drives work while the row is written.
+        """Send the next cycle's SYNC after `transmit`, so that the drives work while the row is
+        written.
 
-        Only in lockstep, and only if nothing else is sent before that cycle's `sync`.
+        Call it only in lockstep, and only if nothing else is sent before that cycle's `sync`.
         """
 
     def faults(self) -> Sequence[Fault]:
-        """Return why the drives must not run any longer, one fault for each failed axis.
+        """Return the faults that must stop the drives, one for each failed axis.
 
-        The fault of a bus has axis -1. Cheap to call.
+        The fault of a bus has axis -1. The call is fast.
         """
 
 
-# Measured cable tensions as arrays beside the axis feedback, whoever measures them.
+# Measured cable tensions as arrays, independent of the device that measures them.
 
 
 class TensionFault(IntEnum):
@@ -110,7 +112,7 @@ class TensionFault(IntEnum):
 
     NONE = 0
     NO_READING = 1
-    """Nothing was read yet."""
+    """No reading has arrived yet."""
     STALE = 2
     """The last reading is too old: the sensor has stopped answering."""
     OVER_RANGE = 3
@@ -137,8 +139,8 @@ class TensionFeedback:
         self.fault: NDArray[np.uint8] = np.full(n, TensionFault.NO_READING, np.uint8)
         """`TensionFault`, NONE if `valid`."""
         self.upward: FloatArray = np.zeros(4)
-        """1 for a valid reading of the inclinometer, -1 for none, 0 without one; and the upward
-        direction in the platform's frame, (3,)."""
+        """First 1 for a valid reading of the inclinometer, -1 for an invalid one, 0 without an
+        inclinometer; then the upward direction in the platform's frame, (3,)."""
 
 
 class TensionExchange:
@@ -163,14 +165,14 @@ class TensionExchange:
         self._fault[cable] = fault
 
     def publish_upward(self, upward: FloatArray | None, time_s: float) -> None:
-        """Store an inclinometer's upward direction (3,), or None if it has none yet."""
+        """Store an inclinometer's upward direction (3,), or None if there is no reading yet."""
         if upward is None:
             self.feedback.upward[0] = -1.0
         else:
             self.feedback.upward[1:], self._tilted_s = upward, time_s
 
     def update(self) -> None:
-        """Update `feedback`; for the cycle: allocates no array."""
+        """Update `feedback`; called in the cycle, so it allocates no array."""
         feedback = self.feedback
         if feedback.upward[0] != 0.0:
             fresh = self._clock.now_s - self._tilted_s <= self.stale_after_s
@@ -178,7 +180,7 @@ class TensionExchange:
         np.subtract(self._clock.now_s, feedback.time_s, out=feedback.age_s)
         np.copyto(feedback.fault, self._fault)
         np.greater(feedback.age_s, self.stale_after_s, out=self._stale)
-        # before the first reading the fault already says so, and the age is infinite
+        # before the first reading the fault is already set, and the age is infinite
         np.logical_and(
             self._stale, np.isfinite(feedback.age_s, out=feedback.valid), out=self._stale
         )
@@ -186,7 +188,7 @@ class TensionExchange:
         np.equal(feedback.fault, TensionFault.NONE, out=feedback.valid)
 
     def reason(self) -> str:
-        """Return why the tensions are unreliable, after `update`, or an empty text."""
+        """Return the reason why the tensions are unreliable after `update`, or ""."""
         feedback = self.feedback
         if feedback.valid.all():
             return ""
@@ -213,9 +215,10 @@ class TensionWatch:
         self._stop_above_N = stop_above_N
 
     def fault(self) -> Fault | None:
-        """Return why the motion must be braked, None if it need not.
+        """Return the fault that must brake the motion, or None.
 
-        It never removes the torque immediately, because slack cables drop the platform.
+        The fault never removes the torque immediately, because the platform would fall on slack
+        cables.
         """
         exchange = self._exchange
         exchange.update()
@@ -233,6 +236,6 @@ class TensionWatch:
         detail: str = "",
     ) -> Fault:  # fmt: skip
         cables = self._exchange.cables
-        axis = cable if len(cables) == 1 else -1  # several are not those of a single winch
+        axis = cable if len(cables) == 1 else -1  # several cables do not belong to a single winch
         source = f"load cell {cables[cable]}"
         return Fault(Limit.SAFETY_STOP, axis, code, source, value, allowed, detail)

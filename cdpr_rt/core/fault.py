@@ -1,4 +1,4 @@
-"""Faults: one record of what failed and where, and the only module that formats it as text."""
+"""Faults: the record of a failure, and the functions that format it as text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 from cdpr_profiles.robot_limits import Limit
 
 IN_FAULT: Final = "in_fault"
-"""Code of a drive that is in fault and has reported no cause."""
+"""Code for a drive that is in fault but has reported no cause."""
 BUS_LOST: Final = "bus_lost"
 BUS_OFF: Final = "bus_off"
 POWER_UNCONFIRMED: Final = "power_unconfirmed"
@@ -17,15 +17,15 @@ POWER_UNKNOWN: Final = "power_unknown"
 PEAK: Final = "peak"
 PROGRAM: Final = "program"
 LOAD_CELL: Final = "load_cell"
-"""Code of a load cell whose tension is no longer known."""
+"""Code for a load cell whose tension is no longer known."""
 LOAD_CELL_HIGH: Final = "load_cell_high"
 OR_LANDED: Final = "or_landed"
-"""Code of a cable that lost its tension while the platform was lowered without a pose."""
+"""Code for a cable that lost its tension while the platform was lowered without a pose."""
 IN_REASON: Final = (POWER_UNCONFIRMED, POWER_UNKNOWN, PROGRAM)
 """Codes that are part of the reason even if something else failed first."""
 
 IN_DRIVES_FAULT: Final = (Limit.DRIVE, Limit.STALE, Limit.MISSED, Limit.MISSED_IN_WINDOW)
-"""Limits whose finding is part of the fault of the drive concerned."""
+"""Limits that count as part of the fault of the drive concerned."""
 
 Key = tuple[Limit, int, str, str]
 
@@ -45,16 +45,18 @@ class Fault(NamedTuple):
     detail: str = ""
     """Meaning of a code, or the text of another part, such as an operating system's error."""
     suspects: tuple[int, ...] = ()
-    """Axes that may have caused it if `axis` is not known, the likeliest first."""
+    """Axes that may have caused the fault if `axis` is not known, the most likely first."""
 
     @property
     def key(self) -> Key:
-        """Return its identity; for no single axis, this includes the source."""
+        """Return the identity of the fault; if there is no single axis, it includes the source."""
         who = "" if self.axis >= 0 else self.source or self.detail
         return self.limit, self.axis, self.code, who
 
     def explains(self, other: Fault) -> bool:
-        """Return whether this fault gives the cause of a drive failure that `other` only states."""
+        """Return whether this fault gives the cause of a drive failure that `other` reports without
+        a cause.
+        """
         if self.axis < 0 or self.axis != other.axis or self.limit is not Limit.DRIVE:
             return False
         vague = other.limit is not Limit.DRIVE or other.code == IN_FAULT
@@ -105,7 +107,7 @@ _ACTIONS: Final = (
 
 
 def fault_text(fault: Fault, names: Sequence[str]) -> str:
-    """Return a fault as text: the axis by `names`, the state, its cause and what to do."""
+    """Return a fault as text: the axis by `names`, the state, its cause and the remedy."""
     limit, code = fault.limit, fault.code
     if code in _BY_CODE:
         at = f" ({fault.source})" if fault.source else ""

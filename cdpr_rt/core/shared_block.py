@@ -1,7 +1,7 @@
-"""The memory that the loop's process shares with the others: rows out, commands in, no lock.
+"""The memory that the loop's process shares with others: rows out, commands in, without locks.
 
-Each part has one writer. A counter next to it shows readers what is complete: a reader that finds
-the same counter before and after its copy has a consistent copy. Neither side waits for the other.
+Each part has one writer. A counter next to it shows which data are complete: a reader that finds
+the same counter before and after copying has a consistent copy. Neither side waits for the other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cdpr_rt.errors import ControlError
 
 MAGIC: Final = 0x63647072_72743033
 MOST_AXES: Final = 16
-# other processors may let a reader see a counter before the data that it counts
+# on other processors a reader may see a counter before the data that it counts
 _IN_ORDER: Final = ("x86_64", "i686", "i386")
 DESCRIPTION_BYTES: Final = 1 << 17
 STATUS_BYTES: Final = 1 << 15
@@ -30,7 +30,7 @@ MESSAGE_BYTES: Final = 1 << 12
 MESSAGES: Final = 64
 URGENT_MESSAGES: Final = 16
 SAMPLES: Final = 64
-# shortening the file would kill every process that reads behind its end (SIGBUS)
+# if the file were shortened, every process that reads behind its end would be killed (SIGBUS)
 _SEALS: Final = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 PATH: Final = np.dtype([("name", "S32"), ("time_s", "<f8"), ("over", "<i8")])
@@ -42,18 +42,18 @@ _COUNTERS: Final = np.dtype(
         ("capacity", "<u8"),
         ("loop_pid", "<i8"),
         ("service_pid", "<i8"),
-        ("start_monotonic_ns", "<i8"),  # the same instant on both clocks, taken once
+        ("start_monotonic_ns", "<i8"),  # the same instant on both clocks, read once
         ("start_realtime_ns", "<i8"),
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
-        ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
+        ("service_alive_ns", "<i8"),  # time of the service's last turn, 0 before the first
         ("right_number", "<u8"),  # grows with every grant of the right to move
         ("right_until_ns", "<i8"),  # expiry of the newest grant, 0 if it has ended
         ("mover", "<u8"),  # number of the grant under which the loop moves, 0 for none
         ("rows", "<u8"),  # rows written since the beginning
-        ("recorded", "<u8"),  # those of them that are safe in the recording
+        ("recorded", "<u8"),  # rows that are safe in the recording
         ("description", "<u8"),  # versions of the texts; odd while one is being written
         ("status", "<u8"),
-        ("commands", "<u8"),  # messages written since the beginning, and those taken
+        ("commands", "<u8"),  # messages written since the beginning, and messages taken
         ("commands_taken", "<u8"),
         ("commands_void", "<u8"),  # commands up to this number must no longer start a motion
         ("urgent", "<u8"),  # stops: read before commands
@@ -74,7 +74,10 @@ SAMPLE: Final = np.dtype(
         ("scale", "<f8"),
         ("buttons", "<u4"),
         ("session", "<u4"),
-        ("right", "<u8"),  # number of the grant of the right to move under which it came
+        (
+            "right",
+            "<u8",
+        ),  # number of the grant of the right to move under which the sample was sent
     ]
 )
 """One sample of the set-point stream; `sequence` only grows within a session."""
@@ -85,17 +88,17 @@ class SharedBlockError(ControlError):
 
 
 class SharedBlock:
-    """All parts as arrays over one file descriptor; `create` makes it, `attach` joins it.
+    """All parts as arrays over one file descriptor, which `create` makes and `attach` maps.
 
-    The descriptor is inherited by child processes; when the last has ended, nothing is left. A
-    descriptor opened for reading only gives read-only arrays.
+    Child processes inherit the descriptor. When the last process has ended, the memory is freed.
+    With a descriptor that was opened for reading only, the arrays are read-only.
     """
 
     def __init__(self, fd: int, n: int, capacity: int) -> None:
         self.fd = fd
         self.n = n
         self.capacity = capacity
-        """Number of rows kept; a reader further behind has lost some."""
+        """Number of rows kept; a reader that is further behind has lost rows."""
         sizes = _sizes(n, capacity)
         reads_only = fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
         access = mmap.ACCESS_READ if reads_only else mmap.ACCESS_WRITE
@@ -105,7 +108,7 @@ class SharedBlock:
             views.append(np.frombuffer(self._map, np.uint8, size, first))
             first += size
         self.counters: Row = views[0][: _COUNTERS.itemsize].view(_COUNTERS)
-        """One row; `counters["rows"][0]` and so on. Its type names the writers."""
+        """One row of counters, such as `counters["rows"][0]`."""
         self._description, self._status = views[1], views[2]
         self._commands = views[3].reshape(MESSAGES, MESSAGE_BYTES)
         self._urgent = views[4].reshape(URGENT_MESSAGES, MESSAGE_BYTES)
@@ -133,9 +136,10 @@ class SharedBlock:
 
     @classmethod
     def attach(cls, fd: int) -> SharedBlock:
-        """Join the block behind an inherited descriptor; raises SharedBlockError.
+        """Map the block of an inherited descriptor; raises SharedBlockError.
 
-        Also raised on a processor that may show stores to another process out of order.
+        It also raises SharedBlockError on a processor on which other processes may see stores out
+        of order.
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise SharedBlockError(
@@ -148,7 +152,7 @@ class SharedBlock:
             raise SharedBlockError("the shared memory is empty")
         try:
             sealed = fcntl.fcntl(fd, fcntl.F_GET_SEALS) & _SEALS == _SEALS
-        except OSError:  # a file that cannot be sealed
+        except OSError:  # the file cannot be sealed
             sealed = False
         if not sealed:
             raise SharedBlockError("the shared memory can be resized by others")
@@ -164,11 +168,11 @@ class SharedBlock:
     # -- texts: the loop writes, others read
 
     def write_description(self, value: Mapping[str, Any]) -> None:
-        """Publish what does not change after a boot: the robot, its axes, limits, programs."""
+        """Publish data that do not change after a boot: the robot, its axes, limits, programs."""
         self._write_text("description", self._description, value)
 
     def write_status(self, value: Mapping[str, Any]) -> None:
-        """Publish what changes occasionally: state, program, reasons, notices."""
+        """Publish data that change occasionally: state, program, reasons, notices."""
         self._write_text("status", self._status, value)
 
     def description(self) -> dict[str, Any]:
@@ -218,7 +222,7 @@ class SharedBlock:
         self.counters["commands_void"][0] = self.counters["commands"][0]
 
     def post_urgent(self, value: Mapping[str, Any]) -> int:
-        """Queue a stop beside the commands; return its number, which is negative.
+        """Queue a stop, in a separate queue from commands; return its number, which is negative.
 
         Raises SharedBlockError.
         """
@@ -229,7 +233,7 @@ class SharedBlock:
         return self._take("urgent", self._urgent)
 
     def post_reply(self, value: Mapping[str, Any]) -> int:
-        """Queue a reply. Raises SharedBlockError if nobody takes them."""
+        """Queue a reply. Raises SharedBlockError if no process takes replies."""
         return self._post("replies", self._replies, value)
 
     def take_reply(self) -> dict[str, Any] | None:
@@ -272,7 +276,7 @@ class SharedBlock:
 
 
 class RowReader:
-    """Follows the ring of rows from now on; any number of readers, each at its own pace."""
+    """Reads new rows from the ring; any number of readers may do so, each at its own pace."""
 
     def __init__(self, block: SharedBlock) -> None:
         self._block = block
@@ -282,7 +286,7 @@ class RowReader:
         """Rows that were overwritten before they were read."""
 
     def read(self, most: int = 1 << 30) -> Row:
-        """Return a copy of the rows written since, oldest first, at most `most`; perhaps none."""
+        """Return a copy of the new rows, oldest first, at most `most`; it may be empty."""
         block = self._block
         capacity = block.capacity
         head = int(block.counters["rows"][0])
@@ -293,7 +297,7 @@ class RowReader:
         last = min(head, self.next + most)
         numbers = np.arange(self.next, last, dtype=np.int64) % capacity
         rows = block.rows[numbers]
-        # the writer may have overtaken the copy, and may be inside one row
+        # the writer may have overtaken the copy, and may be writing one row
         overwritten = int(block.counters["rows"][0]) - capacity + 1
         stale = min(max(0, overwritten - self.next), rows.size)
         self.lost += stale

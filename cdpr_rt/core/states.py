@@ -18,7 +18,7 @@ class LoopState(IntEnum):
     ACTIVE = 3
     """The drives have power and a program runs."""
     FAULT = 4
-    """Something ended the motion; the state lasts until it is acknowledged."""
+    """A fault ended the motion; the state lasts until the fault is acknowledged."""
 
     @property
     def label(self) -> str:
@@ -57,7 +57,7 @@ class Reaction(IntEnum):
     CLAMP = 1
     """The value is limited, the motion continues."""
     HOLD = 2
-    """The set-point stops where it is; the drives keep their power."""
+    """The set-point stops; the drives keep their power."""
     CONTROLLED_STOP = 3
     """The motion is braked under its controller, then the power is removed."""
     QUICK_STOP = 4

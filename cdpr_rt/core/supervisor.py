@@ -20,17 +20,18 @@ from cdpr_rt.jit import bound, bound_to, jit
 # Limits of a supervisor, and the reaction to each.
 
 POSE_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable)
-"""Limits after which a platform's pose is unreliable, or a winch does not respond."""
+"""Limits that, if exceeded, show that a platform's pose is unreliable or a winch does not
+respond."""
 
 LENGTHS_UNRELIABLE: Final = frozenset(limit for limit in Limit if limit.unreliable == "lengths")
-"""Limits after which even the cables' lengths are unknown."""
+"""Limits that, if exceeded, also make the cable lengths unknown."""
 
 
 def reactions_of(named: Reactions, lowers: bool = False) -> dict[Limit, Reaction]:
-    """Return the reaction to each limit by a robot's file.
+    """Return the reaction to each limit according to a robot's file.
 
-    If the platform can be lowered, quick stops that its file does not ask for are replaced by
-    controlled stops: the winches that still work lower it.
+    If the platform can be lowered, controlled stops replace the quick stops that its file does not
+    request: the winches that still work lower it.
     """
     by_label = {reaction.label: reaction for reaction in Reaction}
     wanted = {limit: by_label[getattr(named, limit.key)] for limit in Limit if limit}
@@ -48,13 +49,13 @@ Bound = float | FloatArray
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the axes: one figure for all, or (n,) one for each.
+    """Limits of the axes: one value for all, or one for each (n,).
 
     Omitted limits are not checked; `RobotLimits` has the defaults of robots.
     """
 
     torque_Nm: Bound
-    """Torque is clamped to this."""
+    """Limit to which the torque is clamped."""
     speed_rad_s: Bound
     following_error_rad: Bound
     missed_cycles: int
@@ -76,13 +77,13 @@ class Limits:
     missed_in_window: int = 1 << 30
     window_cycles: int = 1
     stale_cycles: int = 1 << 30
-    """Number of cycles for which a drive may be silent or its answers irregular."""
+    """Number of cycles for which a drive may not answer, or may answer irregularly."""
     lengths_disagree_m: float = math.inf
     """Largest normalised residual of a platform's cable lengths."""
     lengths_jump_m: float = math.inf
     """Largest change of a residual within some 0.2 s."""
     late_s: float = math.inf
-    """Longest delay of the loop itself."""
+    """Longest allowed delay of the loop itself."""
     reactions: Mapping[Limit, Reaction] = field(default_factory=dict)
     """Reactions that differ from `DEFAULT_REACTIONS`."""
 
@@ -100,21 +101,21 @@ _MISSED, _MISSED_IN_WINDOW = int(Limit.MISSED), int(Limit.MISSED_IN_WINDOW)
 _ENCODER_JUMP = int(Limit.ENCODER_JUMP)
 
 FIGURES: Final = tuple(name for name in Limits.__dataclass_fields__ if name != "reactions")
-"""The attributes of `Limits` that are numbers."""
+"""Attributes of `Limits` that are numbers."""
 AXIS_LIMITS: Final = np.dtype([(name, "<f8") for name in (*FIGURES, "period_s")])
 AXIS_HISTORY: Final = np.dtype(
     [
-        ("torque", "<f8"),  # as passed on in the last cycle
+        ("torque", "<f8"),  # torque passed to the drives in the last cycle
         ("missed", "<f8"),  # consecutive
         ("in_window", "<f8"),
         ("window_index", "<i8"),  # index of the last cycle in the window
         ("stale", "<f8"),
-        ("low_s", "<f8"),  # since the tension was last sufficient
+        ("low_s", "<f8"),  # time since the tension was last sufficient
         ("slack_s", "<f8"),
         ("tight_rad", "<f8"),  # motor angle at that time
-        ("low_armed", "<f8"),  # whether it was since enabling, or since this was last reported
+        ("low_armed", "<f8"),  # whether it was sufficient since enabling, or since the last report
         ("slack_armed", "<f8"),
-        ("mean_N", "<f8"),  # its tension, low-passed while it does not run in
+        ("mean_N", "<f8"),  # tension, low-passed while the winch does not wind in fast
         ("valid_count", "<f8"),  # valid angles since enabling, up to 2
         ("valid_rad", "<f8"),  # the last valid angle
         ("velocity_rad_s", "<f8"),  # velocity at that time
@@ -130,10 +131,10 @@ VERDICT: Final = np.dtype(
 
 
 class Signals(NamedTuple):
-    """Signals of one cycle that are checked, named as in the objects that have them, (n,)."""
+    """Signals of one cycle to be checked, (n,), named as in the objects that contain them."""
 
     position: FloatArray
-    """From `AxisFeedback`, up to `rate_ok`."""
+    """This and the following signals up to `rate_ok` come from `AxisFeedback`."""
     valid: BoolArray
     alive: BoolArray
     rate_ok: BoolArray
@@ -141,7 +142,7 @@ class Signals(NamedTuple):
     """From `Setpoint`."""
     setpoint_velocity: FloatArray
     velocity: FloatArray
-    """From `AxisEstimate`, up to `sensor_ok`."""
+    """This and the following signals up to `sensor_ok` come from `AxisEstimate`."""
     cable_m_per_rad: FloatArray
     length: FloatArray
     tension: FloatArray
@@ -150,7 +151,7 @@ class Signals(NamedTuple):
 
 
 _JUMP_rad: Final = 0.05
-"""Allowed distance of an angle from its extrapolation, beyond that of the speed limit."""
+"""Allowed distance of an angle from its extrapolation, in addition to that by the speed limit."""
 _JUMPS_S: Final = 0.01
 """Time for which a jump of an angle affects speeds."""
 _SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
@@ -165,7 +166,7 @@ _PAID_OUT_m: Final = 5e-4
 
 @jit
 def _exceeded(worst: Any, limit: int, axis: int, value: float, allowed: float) -> None:
-    """Keep the most severe exceeded limit, of all axes and of this one; of equal ones the first."""
+    """Keep the most severe exceeded limit, of all axes and of this axis; if equal, the first."""
     verdicts, reactions = worst
     for row in (0, 1 + axis):
         verdict = verdicts[row]
@@ -232,7 +233,7 @@ def _watch_jumps(
 def _watch_motion(
     i: int, limits: Any, worst: Any, error: float, velocity: float, length: float, paying_out: float
 ) -> None:
-    # nan is not within its limit either
+    # nan also counts as outside its limit
     if not abs(velocity) <= limits["speed_rad_s"]:
         _exceeded(worst, _SPEED, i, velocity, limits["speed_rad_s"])
     if not abs(error) <= limits["following_error_rad"]:
@@ -258,7 +259,7 @@ def _has_snapped(
     The winch's friction may exceed `slack_N`, and remains in a tension estimated from torque.
     """
     before = history["mean_N"]
-    # mean of the earlier tension: friction alone, until a weak winch turns, is no tension
+    # mean of the earlier tension: friction alone, before a winch turns, does not count
     if np.isfinite(tension) and not runaway_m_s > 0.25 * allowed_m_s:
         history["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
     return bool(runs_away and tension < _SNAPPED_SHARE * before)
@@ -299,7 +300,7 @@ def _watch_tension(
     history["slack_s"] = history["slack_s"] + elapsed if tension < limits["slack_N"] else 0.0
     paid_out = (position - history["tight_rad"]) * cable_m_per_rad
     at_once = history["low_s"] <= limits["broken_within_s"] and paid_out < _PAID_OUT_m
-    # each is reported once, so that the cable can be tightened, and again after it was tight
+    # reported once, so that the cable can be tightened, and again only after the cable was tight
     if history["slack_armed"] and history["slack_s"] > 0.0 and at_once:
         history["low_armed"] = history["slack_armed"] = 0.0
         _exceeded(worst, _BROKEN_CABLE, i, tension, limits["tension_min_N"])
@@ -369,7 +370,7 @@ def check_axes(
         error = signals.setpoint[i] - position
         _watch_motion(i, limits, worst, error, velocity, signals.length[i], paying_out)
         if not signals.sensor_ok[i]:
-            # the estimate replaces it, and its step would look like a broken cable
+            # the estimate replaces the reading, and the step would look like a broken cable
             _exceeded(worst, _TENSION_SENSOR, i, np.nan, np.nan)
             continue
         _watch_tension(
@@ -379,12 +380,12 @@ def check_axes(
 
 
 Suspects = Callable[[bool], Sequence[int]]
-"""Returns the axes whose cables may contradict the others, the likeliest first; the argument
-selects the sudden changes of the residuals as the evidence."""
+"""Function that returns the axes whose cables may contradict the others, the most likely first. If
+its argument is true, it uses sudden changes of the residuals."""
 
 
 def no_suspects(_jump: bool) -> Sequence[int]:
-    """Return no axes: nothing is known about them."""
+    """Return no axes, because nothing is known about them."""
     return ()
 
 
@@ -407,16 +408,17 @@ class Supervisor:
         self._verdicts = np.zeros(1 + n, VERDICT)
         self._verdict = self._verdicts[:1]
         self._reported: dict[int, Fault] = {}
-        """The findings of this cycle that came from `report`, by row of `_verdicts`."""
+        """Faults of this cycle from `report`, by row of `_verdicts`."""
         self._of_no_axis: dict[Limit, Fault] = {}
-        """The findings of this cycle that end a motion and are of no single axis."""
+        """Faults of this cycle that end a motion and belong to no single axis."""
         self._disagree_s = 0.0
         self._suspects: tuple[int, ...] | None = None
-        """Axes whose lengths may be wrong, from the first disagreement until they agree."""
+        """Axes whose lengths may be wrong, from the first disagreement until lengths agree
+        again."""
         self._kernel = bound_to(self._bind)
 
     def reset(self, torque_Nm: FloatArray | float = 0.0) -> None:
-        """Forget the past, before motors are driven; `torque_Nm` is their first torque."""
+        """Discard the history before motors are driven; `torque_Nm` is their first torque."""
         self._history[:] = np.zeros(1, AXIS_HISTORY)
         self._history["torque"] = torque_Nm
         self._window[:] = 0
@@ -436,9 +438,9 @@ class Supervisor:
     ) -> int:
         """Clamp `torque_Nm` (n,) in place; return the `Reaction` that this cycle requires.
 
-        The arrays are bound again only if one of the four objects is another one than before. With
-        `paying_out_blind` the winches lower a platform without its pose: cables may go slack, and
-        a broken one is detected only by its winch.
+        The arrays are bound again only if one of the four objects has been replaced. With
+        `paying_out_blind`, the winches lower a platform without its pose: cables may become slack,
+        and a broken cable is detected only by the speed of its winch.
         """
         self._reported.clear()
         self._of_no_axis.clear()
@@ -474,14 +476,15 @@ class Supervisor:
     ) -> int:
         """Check how much cable lengths contradict each other; return the `Reaction` so far.
 
-        `elapsed_s` is the time since the last cycle; `axis` that of the cable which contradicts the
-        others, -1 if it is not known. Then `suspects` returns the possible ones, the likeliest
-        first; it is called once, when the limit is exceeded. `jump_m` is the largest sudden change
-        of a residual, and `jumped` the cable of that residual, -1 if it is not known.
+        `elapsed_s` is the time since the last cycle. `axis` is the axis of the cable that
+        contradicts the others, -1 if it is not known; in that case `suspects` returns the possible
+        axes, the most likely first. It is called once, when the limit is exceeded. `jump_m` is the
+        largest sudden change of a residual, and `jumped` the cable of that residual, -1 if it is
+        not known.
 
-        A disagreement counts once it has lasted `broken_within_s` longer than the agreement in
-        between. So a broken cable is detected by its tension first, and lengths that swing about
-        the limit are detected too.
+        A disagreement is a fault when it has lasted `broken_within_s` longer than the agreement in
+        between. So a broken cable is first detected by its tension, and lengths that oscillate
+        about the limit are also detected.
         """
         limit, allowed = Limit.LENGTHS, self.limits.lengths_disagree_m
         agree = disagree_m <= allowed
@@ -503,7 +506,8 @@ class Supervisor:
     def report(self, fault: Fault) -> int:
         """Process a fault that another part found, such as a drive's alarm; return the `Reaction`.
 
-        It counts until the next `check`, and only if it is worse than the findings of that one.
+        It is valid until the next `check`, and only used if it is more severe than the faults of
+        this cycle.
         """
         reaction, worst = int(self._reactions[fault.limit]), int(self._verdict["reaction"][0])
         verdict = (reaction, fault.limit, fault.axis, fault.value, fault.allowed)
@@ -519,7 +523,9 @@ class Supervisor:
         return max(reaction, worst)
 
     def findings(self) -> Iterator[Fault]:
-        """Yield the findings that end a motion: those of no single axis, the worst of each axis."""
+        """Yield the faults that end a motion: those of no single axis, and the worst of each
+        axis.
+        """
         yield from self._of_no_axis.values()
         for row in np.flatnonzero(self._verdicts["reaction"] > Reaction.HOLD).tolist():
             if int(self._verdicts["axis"][row]) == row - 1 and (
@@ -528,9 +534,9 @@ class Supervisor:
                 yield self._fault(row)
 
     def peaks(self) -> list[Fault]:
-        """Return which cables exceeded their highest tension since power-on, even if only briefly.
+        """Return faults of cables that exceeded their highest tension since power-on, even briefly.
 
-        A tension that is short enough ends before its filtered value exceeds the limit.
+        A short peak of tension may end before its filtered value exceeds the limit.
         """
         peak_N, most_N = self._history["peak_N"], self._limits["tension_max_N"]
         return [
@@ -545,16 +551,16 @@ class Supervisor:
 
     @property
     def limit(self) -> Limit:
-        """Exceeded limit, NONE if there was none."""
+        """Exceeded limit, or NONE."""
         return Limit(int(self._verdict["limit"][0]))
 
     @property
     def axis(self) -> int:
-        """Axis that exceeded it, -1 if there is no single axis."""
+        """Axis that exceeded the limit, -1 if there is no single axis."""
         return int(self._verdict["axis"][0]) if self.limit else -1
 
     def fault(self) -> Fault | None:
-        """Return the most severe finding of this cycle, None if no limit was exceeded."""
+        """Return the most severe fault of this cycle, None if no limit was exceeded."""
         return self._fault(0) if self.limit else None
 
     def _fault(self, row: int) -> Fault:

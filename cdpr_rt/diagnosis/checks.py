@@ -1,4 +1,4 @@
-"""Check whether a cable robot can work as its file describes it, and what to change if not."""
+"""Check whether a cable robot can work as its file describes it, and say what to change if not."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from cdpr_rt.platform.motor_learning import (
     MOST_SHARE,
 )
 
-# Whether winches of a platform at home can pull more than their friction, and hold ropes.
+# Whether winches of a platform at home can pull more than their friction, and hold their cables.
 
 _RUBS = 0.6
 """Share of the winches' largest friction that the pretension must exceed: 1.3 times the usual
 friction of a winch without load."""
 _RUBS_LITTLE = 0.5
-"""Friction of some winches over the usual friction."""
+"""Ratio of the friction of some winches to the usual friction."""
 _TIMES = 1.1 ** np.arange(1, 15)
 """Factors with which higher tensions and torques are tried."""
 
@@ -75,7 +75,8 @@ def stand_findings(s: Subject) -> Iterator[Finding]:
 def unwinding(s: Subject) -> Iterator[Finding]:
     """Check whether slack cables may unwind their drums by their weight while power is off.
 
-    It pulls at its exit with the weight of a piece as long as the exit's height above its anchor.
+    A slack cable pulls at its exit with the weight of a piece as long as the exit's height above
+    the anchor.
     """
     hangs_N = 2.0 * np.maximum(s.statics.rises_N(np.array(s.platform.home_m)), 0.0)
     rubs_N = _RUBS_LITTLE * FRICTION_SHARE * s.rated_N
@@ -103,15 +104,15 @@ _GRID = 25
 LONGEST_PERIOD_s = 0.005
 """Longest cycle at which the platform's control is stiff enough to overcome friction."""
 _NEAREST_m = 0.1
-"""An anchor point closer than this to an exit point might be pulled into it."""
+"""The cable might pull an anchor point into an exit point that is closer than this."""
 _ALIKE_m = 0.01
 """Two cables closer than this at both ends act as one: an axis was described twice."""
 _SAGS_m_N = 0.01
 """Largest allowed change of length by sag per newton; a motor's friction is some newtons."""
 _ROUNDED_UP = 1.05
-"""Factor that keeps a value sufficient after rounding to two digits."""
+"""Factor with which a value is still sufficient after rounding to two digits."""
 _FRICTION_SHARE = 0.06
-"""Largest friction and cogging of a servo winch together, over the motor's rated torque."""
+"""Largest sum of friction and cogging of a servo winch, as a share of the motor's rated torque."""
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
 
@@ -119,7 +120,7 @@ _WIDE_ARMS = 0.5
 def diagnose(robot: Robot, limits: Limits | None = None) -> list[Finding]:
     """Return impossible or doubtful properties of a robot's platform, the worst first.
 
-    `limits` are those of its file by default.
+    `limits` defaults to those of the robot's file.
     """
     if robot.platform is None:
         return []
@@ -127,13 +128,14 @@ def diagnose(robot: Robot, limits: Limits | None = None) -> list[Finding]:
     statics = s.statics
     found = [*_cycle(robot), *_shape(s)]
     if not any(finding.impossible for finding in found):
-        # points that cannot be meant also cause the faults of tensions and torques
+        # implausible points also cause the faults of tensions and torques
         found += [*_tensions(statics), *_motors(s), *_cable_speeds(s), *_lengths(s), *_sagging(s)]
         if statics.turns_freely:
             found += turning.free_rotation(statics)
         turned = list(turning.angles(statics))
         if not turned:
-            # the loop's design includes such turned poses; its failure there would only repeat this
+            # the loop's design includes such turned poses, and its failure would only repeat this
+            # finding
             found += loop_findings(s)
         found += [
             *turned,
@@ -151,7 +153,7 @@ def diagnose(robot: Robot, limits: Limits | None = None) -> list[Finding]:
 def refuse_impossible(robot: Robot, limits: Limits | None = None) -> list[str]:
     """Return doubtful properties of a robot within `limits`, as `diagnose` does, a line each.
 
-    Raises ProfileError if it is impossible: a line for each key, with what to change.
+    Raises ProfileError if the robot is impossible: a line for each key, with the change to make.
     """
     found = diagnose(robot, limits)
     wrong = [finding for finding in found if finding.impossible]
@@ -339,9 +341,9 @@ def _sagging(s: Subject) -> Iterator[Finding]:
 
 
 def _contact(statics: PlatformStatics) -> Iterator[Finding]:
-    """Check where in its box cables, platform or obstacles touch, at home's orientation.
+    """Check where in the box of targets cables, platform or obstacles touch, at home's orientation.
 
-    The file is impossible if they touch everywhere in any orientation.
+    The file is impossible if they touch everywhere in some orientation.
     """
     points, interference = statics.points(), statics.model.interference
     clearances_m, pairs = interference.clearances(statics.poses(points))
@@ -368,14 +370,14 @@ def rounded_down(value: float) -> str:
     return f"{math.floor(value * 10.0**digits) / 10.0**digits:g}"
 
 
-# Why a pose is not feasible, and which figure of the robot's file would change it.
+# Why a pose is not feasible, and which value of the robot's file would make it feasible.
 
 _FLAT = 1e-3
-"""Largest distance of points from a line or plane that they count as in, over their span."""
+"""Largest distance at which points count as in a line or plane, as a share of their span."""
 _FACTORS = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
-"""Factors on a figure that are tried in turn until one helps: decreasing."""
+"""Decreasing factors on a value, tried in turn until one helps."""
 _MORE = np.geomspace(1.02, 100.0, 230)
-"""Increasing factors, likewise."""
+"""Increasing factors on a value, tried in turn until one helps."""
 
 
 def why_not_held(
@@ -383,7 +385,7 @@ def why_not_held(
 ) -> tuple[str, str]:
     """Return why a position (k,) with a rotation (3,) is not feasible, and what would help.
 
-    That is a text, and the key of the value that would help, "" if it is the position.
+    The result is a text, and the key of the value that would help, "" if this is the position.
     """
     where = f"at {point_text(position_m)} m"
     reserve = float(statics.margin_N(position_m, 0.0, turn_rad))
@@ -405,8 +407,7 @@ def why_not_held(
 
 
 def _singular(statics: PlatformStatics) -> str:
-    """Return as text that the cables cannot hold a direction, and which points in a line or plane
-    cause it."""
+    """Return a text that says which direction cables cannot hold, and which points cause it."""
     text = "the cables cannot hold one direction with any tensions"
     for name, points in (("exit points", statics.exits_m), ("anchor points", statics.anchors_m)):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

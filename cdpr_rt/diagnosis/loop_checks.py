@@ -46,18 +46,18 @@ def loop_stiffness(model: PlatformModel, gains: LoopGains, q: FloatArray) -> Flo
 
 
 def moved_by_friction_m(s: Subject) -> float:
-    """Return how far usual friction moves the platform along a direction, as `turned_by_friction`.
+    """Return how far usual friction moves the platform, as in `turned_by_friction`.
 
-    One standard deviation, in the worst direction and at the worst place.
+    It is one standard deviation, in the worst direction and at the worst position.
     """
     poses = design_poses(s.model)
     return max(float(_moved(s, q)[: s.model.positions].max()) for q in poses)
 
 
 def stretched_by_acceleration_m(s: Subject) -> float:
-    """Return how far cables yield along a direction during acceleration along all of them.
+    """Return the largest displacement by cable stretch during acceleration in all directions.
 
-    The largest K^-1 m a, with K = J^T diag(EA / l) J, over the poses of the loop's design.
+    It is the largest K^-1 m a, with K = J^T diag(EA / l) J, over the poses of the loop's design.
     """
     model, k, kinematics = s.model, s.model.positions, s.model.kinematics
     force = np.zeros(model.size)
@@ -72,7 +72,7 @@ def stretched_by_acceleration_m(s: Subject) -> float:
 
 
 def _usual_friction_N(s: Subject) -> FloatArray:
-    """Return the standard deviation of the winches' friction in their cables, (n,)."""
+    """Return the standard deviation of the winches' friction as tensions of their cables, (n,)."""
     return np.asarray(FRICTION_SHARE * s.rated_N)
 
 
@@ -87,8 +87,8 @@ def turned_by_friction(s: Subject) -> str:
     """Return about which axis friction turns the platform too far, as text; "" for none.
 
     Usual friction of standard deviation f (n,) in each winch turns it by that of K^-1 J^T f until
-    the integral part has overcome it. The result is "" if the cables can hold it turned so far at
-    all poses of the loop's design with home's orientation.
+    the integral part has overcome it. The result is "" if the cables can hold the platform with
+    this rotation at all poses of the loop's design with home's orientation.
     """
     model, k, worst, text = s.model, s.model.positions, 1.0, ""
     friction_N = float(_usual_friction_N(s).max())
@@ -122,7 +122,9 @@ def _about(model: PlatformModel, i: int) -> str:
 def _held_share(
     statics: PlatformStatics, position_m: FloatArray, axis: int, angle_rad: float
 ) -> float:
-    """Return up to which share of an angle about an axis, both ways, tensions hold the platform."""
+    """Return the share of an angle about an axis, in both directions, up to which cables hold the
+    platform.
+    """
     turn = angle_rad * np.eye(3)[axis]
     for share in _SHARES:
         turns = np.array([share * turn, -share * turn])
@@ -175,7 +177,7 @@ def loop_findings(s: Subject) -> Iterator[Finding]:
 
 
 def _known_damping(robot: Robot) -> str:
-    """Return that the cables' profile has less damping than usual, as text; "" if not."""
+    """Return a text if the cables' profile has less damping than usual, else ""."""
     least_s = min(axis.winch.cable.damping_s for axis in robot.axes)
     if least_s >= CABLE_DAMPING_s:
         return ""

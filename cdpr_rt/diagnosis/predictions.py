@@ -1,4 +1,4 @@
-"""Predictions of how a platform swings: after a loss, over its cables, and if it turns freely.
+"""Predictions of a platform's swing: after a loss, on its cables, and if it turns freely.
 
 They are simulated, because an equilibrium does not show the motion: motors yield to more than
 their torque, and the remaining winches then lower the platform.
@@ -290,26 +290,29 @@ def _stand(
 
 
 SWING_S = 1.0
-"""Time from the break that counts as the swing; afterwards the platform is lowered."""
+"""Time after the break in which the motion is evaluated as the swing; afterwards the platform is
+lowered."""
 _LONGEST_S = 30.0
 _NOTICED_LATE, _NOTICING_S, _NOTICED_S = 1.5, 0.015, 0.25
 """Time until the break is detected: a factor on the time in which the rotor exceeds its speed
-limit, the delay of filters and buses, and the longest time, for cables with almost no tension."""
+limit, the delay of filters and buses, and the longest time, which applies to cables with almost no
+tension."""
 _MISLED_SHARE = 0.25
-"""Force of the control that follows a wrong pose, over the span of tensions; its proportional part
-saturates."""
+"""Force of a control that follows a wrong pose, as a share of the span of tensions; the
+proportional part saturates."""
 FRICTIONS: Final = (0.0, 0.03, MOST_SHARE + COGGING_SHARE)
-"""Friction of the winches over the motors' rated torques, up to the share that a robot's file
-includes; each is simulated."""
+"""Friction of the winches as shares of the motors' rated torques, up to the share that a robot's
+file includes; each share is simulated."""
 _STANDS_m = 0.005
 """Height above the ground below which a platform counts as standing."""
 _NEAREST_m = 1e-3
 _STEP_rad = 0.2
 """Phase of the fastest oscillation, of rotors and platform or a foot on the ground, per step."""
 _GROUND_FRICTION = 0.2
-"""Less than most floors have, so that the platform slides further."""
+"""Friction coefficient of the ground, lower than that of most floors, so that the platform slides
+further."""
 _GROUND_DAMPING = 0.25
-"""Over the critical damping: the platform bounces on the ground."""
+"""Damping of the ground as a share of critical damping, so low that the platform bounces."""
 
 
 class Loss(Enum):
@@ -331,7 +334,7 @@ class Swing:
     """The lost cable; 0 for lost lengths."""
     position_m: tuple[float, ...]
     swing_m: float
-    """Largest distance of the origin from that position within `SWING_S`."""
+    """Largest distance of the platform's origin from its initial position within `SWING_S`."""
     turn_rad: float
     """Largest angle from the initial orientation within `SWING_S`."""
     away_m: float
@@ -341,15 +344,15 @@ class Swing:
     fastest_m_s: float
     """Highest speed downward."""
     hangs_m: float
-    """Height above its ground at which friction of the winches may hold it without power; 0 if it
-    always comes down."""
+    """Height above the ground at which friction of the winches may hold the platform without power;
+    0 if it always comes down."""
 
 
 def corner_swings(s: Subject, loss: Loss = Loss.CABLE) -> list[list[Swing]]:
     """Return for each cable the platform's motions at all corners of the box of targets.
 
-    Lost lengths have one list. All are in the orientation of home; a corner that is no target is
-    replaced by the nearest target on a grid. The lists are empty if there are no targets.
+    Lost lengths have one list. The platform has the orientation of home. A corner that is not a
+    target is replaced by the nearest target on a grid. The lists are empty if there are no targets.
     """
     losses, cables = CableLoss(s), range(1 if loss is Loss.LENGTHS else s.n)
     return [[losses.swing(i, place, loss) for place in s.corner_targets] for i in cables]
@@ -555,9 +558,10 @@ def _squares(
 
 _SLIPS_m = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 _SUDDEN_SHARE = 0.7
-"""Share of a slip's jump that remains when it counts: low-passed residuals follow meanwhile."""
+"""Share of a slip's jump that remains when it is detected, because low-passed residuals follow
+it."""
 _WITHIN_S, _STEP_s = 0.15, 5e-5
-"""Time until even the longest slip is taut again, and the step."""
+"""Time until the cable is taut again even after the longest slip, and time step."""
 
 
 @dataclass(frozen=True)
@@ -565,7 +569,7 @@ class Slip:
     """Effects of a slip of one cable on a platform at rest, at the worst place."""
 
     unnoticed_m: float
-    """Largest slow slip with lengths that contradict each other by no more than is allowed."""
+    """Largest slow slip after which the lengths' disagreement is still within its limit."""
     sudden_m: float
     """Largest sudden slip that is not detected; at most `unnoticed_m`."""
     off_m: float
@@ -580,8 +584,8 @@ def slips(s: Subject) -> list[Slip]:
     """Return for each cable the effects of its slip, at home and at the corners of the targets.
 
     A slip s of cable i moves the pose by J^+ e_i s and has the normalised residual s sqrt(p_ii),
-    with P = I - J J^+. A sudden slip is detected by the jump of the residual. Slips that only
-    tension shows are ignored: cables may slip slowly.
+    with P = I - J J^+. A sudden slip is detected by the jump of the residual. Detection by tension
+    is ignored, because cables may slip slowly.
 
     The highest tension is that of `_snatch_N`.
     """
@@ -674,7 +678,8 @@ class FreeRotation:
 def free_rotation(model: PlatformModel) -> FreeRotation | None:
     """Return the swing of a platform whose set-points are averaged over SHAPING_s.
 
-    None if its cables control its angle, it has no angle, or they turn it over.
+    Returns None if the cables control the platform's angle, if it has no angle, or if the cables
+    turn it over.
     """
     platform = model.platform
     if not model.kinematics.turns_freely:
@@ -698,7 +703,7 @@ def free_rotation(model: PlatformModel) -> FreeRotation | None:
 def _along(ways: FloatArray, speed: float, most: float) -> tuple[FloatArray, FloatArray]:
     """Return positions and accelerations (steps, m, 2) along straight ways (m, 2, 2) from rest.
 
-    Trapezoidal speed, the longer direction at the bounds, averaged over SHAPING_s.
+    Speed is trapezoidal, with the longer direction at its bounds, and averaged over SHAPING_s.
     """
     way = ways[:, 1] - ways[:, 0]
     far = np.abs(way).max(axis=1)

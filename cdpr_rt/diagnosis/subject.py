@@ -19,20 +19,20 @@ from cdpr_rt.platform.loop_design import DesignedLoop, designed_loop
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault or doubt about a key of a robot's file, and what to change."""
+    """A fault or doubt about a key of a robot's file, and the change to make."""
 
     key: str
     text: str
     impossible: bool
-    """Whether the robot cannot work like this; otherwise it works with a restriction."""
+    """Whether the robot cannot work with this file; otherwise it works with a restriction."""
     helps: str = ""
-    """Another key whose change the text proposes, if it does."""
+    """Another key, if the text proposes to change it."""
 
 
 class Subject:
     """A robot with a platform, within `limits`, by default those of its file.
 
-    Its winches are arrays over the axes, (n,); slow results are computed once.
+    Data of its winches are arrays over the axes, (n,). Slow results are computed once.
     """
 
     def __init__(self, robot: Robot, limits: Limits | None = None) -> None:
@@ -58,12 +58,12 @@ class Subject:
 
     @cached_property
     def loop(self) -> DesignedLoop:
-        """The loop that is designed for it; raises GeometryError."""
+        """The loop that is designed for the robot; raises GeometryError."""
         return designed_loop(self.model, self.axes, self.robot.sync_period_s)
 
     @cached_property
     def corner_targets(self) -> list[tuple[float, ...]]:
-        """The targets of a grid that are nearest to the corners of their box."""
+        """The targets on a grid that are nearest to the corners of the box of targets."""
         points = self.statics.points()
         targets = points[self.statics.is_target(points)]
         box = zip(self.platform.workspace_min_m, self.platform.workspace_max_m, strict=True)

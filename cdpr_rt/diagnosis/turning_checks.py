@@ -19,9 +19,9 @@ from cdpr_rt.model.statics import NONE_rad, PlatformStatics
 from cdpr_rt.platform.loop_plant import weight_at, whole_stiffness
 
 _TURNED_rad = np.concatenate([[0.01, 0.02, 0.03], 0.04 * np.arange(1, 80)])
-"""Tried angles of a platform: some cables only touch at small ones."""
+"""Angles of a platform that are tried; some cables touch only at small angles."""
 _TIPS_AT = 0.05
-"""Share of its weight that a cable pulls with when it becomes tight."""
+"""Pull of a cable that becomes tight, as a share of the platform's weight."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 
 
@@ -95,7 +95,7 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def lower_when_turned_m(statics: PlatformStatics) -> float:
-    """Return how much lower than at home a turned platform's lowest anchor point may be, m."""
+    """Return how much lower a turned platform's lowest anchor point may be than at home, m."""
     platform, up = statics.platform, statics.model.positions - 1
     angle = platform.workspace_angle_rad
     b = np.array([in_space(point) for point in platform.anchor_points_m])
@@ -120,7 +120,9 @@ def stand_clearance(statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def upright(statics: PlatformStatics) -> Iterator[Finding]:
-    """Check whether a small force can tip it over when it stands upright at home, like a rod."""
+    """Check whether a small force can tip over a platform that stands upright at home, like a
+    rod.
+    """
     tips_at = statics.model.tips_at
     if tips_at < _TIPS_AT:
         text = (
@@ -131,7 +133,7 @@ def upright(statics: PlatformStatics) -> Iterator[Finding]:
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
 
-# How a platform in space hangs and turns if its file leaves angles out of `controlled`.
+# How a platform in space hangs and turns if its file omits angles in `controlled`.
 
 _ENOUGH_CABLES = 6
 _LEAST_deg, _LEAST_mm = 0.1, 0.1
@@ -142,12 +144,12 @@ _FAR_HUNG_deg = 30.0
 def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterator[Finding]:
     """Check how a platform in space turns about axes u that `controlled` leaves out.
 
-    Its control holds the pose that it computes from lengths as if nothing were turned about u:
-    motions are x = N φ_u with N_u = 1, N_c = -J_c^+ J_u. Constant tensions, as planned there, and
-    weight leave a wrench w and give the stiffness K = -∂w/∂x (6, 6). The platform rests
-    at N^T K N φ_u = N^T w, and turns over if N^T K N is not positive definite. The residuals
-    of lengths are J x; normalised ones may be up to `disagree_m`. With fewer than 6 cables the
-    control computes this equilibrium itself, and lengths do not disagree.
+    The control holds the pose that it computes from lengths as if the platform were not turned
+    about u: motions are x = N φ_u with N_u = 1, N_c = -J_c^+ J_u. Constant tensions, as planned
+    there, and weight leave a wrench w and give the stiffness K = -∂w/∂x (6, 6). The platform rests
+    at N^T K N φ_u = N^T w, and turns over if N^T K N is not positive definite. The residuals of
+    lengths are J x; normalised ones may be up to `disagree_m`. With fewer than 6 cables the control
+    computes this equilibrium itself, and lengths do not disagree.
     """
     platform, model = statics.platform, statics.model
     left = [i for i in (3, 4, 5) if i not in model.kinematics.directions]
@@ -173,7 +175,9 @@ def _hanging(
     left: list[int],
     disagree_m: float,
 ) -> tuple[str, bool]:
-    """Return as text how it hangs at the worst place, and whether that is impossible."""
+    """Return as text how the platform hangs at the worst position, and whether that is
+    impossible.
+    """
     wrench, K, J = _stiffness(model, poses, t)
     held = J[..., model.kinematics.directions]
     inverse = np.linalg.pinv(held)
@@ -184,7 +188,9 @@ def _hanging(
     centre = in_space(model.platform.centre_of_mass_m)[None]
     _, size, turns = np.linalg.svd(_moved(poses[0], points, N[0]), full_matrices=False)
     axes = turns[size > LEAST_ARM_m].T
-    if not axes.size:  # no anchor point moves: a rod about itself, or a knot
+    if (
+        not axes.size
+    ):  # no anchor point moves, because it is a rod that turns about itself, or a knot
         hangs = np.linalg.norm(_moved(poses[0], centre, N[0])) > LEAST_ARM_m
         return (
             "the platform swings about these axes, and no cable measures that" if hangs else "",
@@ -216,7 +222,7 @@ def _hanging(
 def _in_words(
     places: FloatArray, x: FloatArray, apart_m: FloatArray, disagree_m: float, computed: bool
 ) -> tuple[str, bool]:
-    """Return as text the worst of the motions (m, 6) into rest, at places (m, 3).
+    """Return as text the worst of the motions (m, 6) to the rest pose, at positions (m, 3).
 
     `apart_m` (m,) is the largest normalised residual at each place. `computed` is whether the
     control computes the equilibrium.

@@ -32,7 +32,7 @@ _Row = Annotated[list[float], Field(min_length=2, max_length=_MOST_SAMPLES)]
 
 
 class CoggingProfileError(ControlError):
-    """A profile that cannot be read, or must not be applied to this axis."""
+    """A profile cannot be read, or must not be applied to this axis."""
 
 
 class _Part(BaseModel):
@@ -50,7 +50,7 @@ class DriveIdentity(_Part):
 
 
 class StoredFriction(_Part):
-    """`FrictionFeedforward` as stored."""
+    """`FrictionFeedforward` in the form of the file."""
 
     coulomb_forward_Nm: float
     coulomb_backward_Nm: float
@@ -169,7 +169,8 @@ class CoggingProfile(_Part):
         return profile
 
     def require_true_of(self, bounds: MotorBounds) -> None:
-        """Raise CoggingProfileError if it belongs to another motor, or is impossible for this one.
+        """Raise CoggingProfileError if the profile belongs to another motor, or is impossible for
+        this one.
 
         The message gives key, value and allowed values.
         """
@@ -211,14 +212,17 @@ OBSERVER_s = 0.003
 
 
 def stored_thesis(result: ThesisResult) -> StoredMethod:
-    """Return the thesis' curves for storage: applied at the encoder's angle, without look-ahead."""
+    """Return the thesis' curves for storage; they apply at the encoder's angle, without
+    look-ahead.
+    """
     return _stored(result.tables(TABLE_SAMPLES), result.friction, 0.0, 0.0)
 
 
 def stored_harmonic_model(result: HarmonicResult, latency_s: float | None = None) -> StoredMethod:
     """Return the harmonic model's tables, friction and timing for storage.
 
-    `latency_s` replaces the identified one, which is not that of the drive in imported recordings.
+    `latency_s` replaces the identified latency, because that of imported recordings is not the
+    drive's.
     """
     ahead = max(0.0, result.latency_s.value if latency_s is None else latency_s)
     return _stored(result.tables(TABLE_SAMPLES), result.friction, ahead, OBSERVER_s)

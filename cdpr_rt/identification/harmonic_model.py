@@ -66,7 +66,7 @@ class Rows:
     x: FloatArray
     y: FloatArray
     acceleration: FloatArray
-    """rad/s² if the inertia is not estimated from the row, else 0."""
+    """Acceleration, rad/s², if the inertia is not estimated from the row, else 0."""
     kind: IntArray
     direction: FloatArray
     time: FloatArray
@@ -138,10 +138,10 @@ def fit(
     """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
 
     `lag_prior` is mean and standard deviation in rad. In slow runs the noise of the acceleration
-    would bias the inertia low. There the inertia from the other runs is used, or `inertia_kg_m2`
-    if there are no others. The covariance is the sandwich estimator over clusters of neighbouring
-    windows, whose errors may be correlated. A single turn has too few clusters; there it is that
-    over rows, times `correlation`, the rows per independent row of each kind.
+    would bias the inertia low. There the inertia from the other runs is used, or `inertia_kg_m2` if
+    there are no others. The covariance is the sandwich estimator over clusters of neighbouring
+    windows, whose errors may be correlated. A single turn has too few clusters. There the estimator
+    is over rows, multiplied by `correlation`, the number of rows per independent row of each kind.
     """
     rows = gather(windows, layout)
     columns = [*used, *range(design.FIXED, layout.columns)]
@@ -254,7 +254,7 @@ _MOST = 40
 _ROWS_PER_ORDER = 8
 _RIDGE = 1e-9
 _OVERLAP = 2.1
-"""Rows over independent rows if only the overlap of the windows correlates them."""
+"""Rows per independent row if only the overlap of windows correlates them."""
 _MOST_CORRELATED = 50
 _UNCORRELATED = 0.05
 
@@ -269,12 +269,12 @@ class OrderSelection:
     orders: tuple[int, ...]
     error_Nm: FloatArray
     correlation: FloatArray
-    """Of each kind of row, see RowWeights."""
+    """Rows per independent row of each kind, see RowWeights."""
 
 
 @dataclass(frozen=True)
 class RowWeights:
-    """For each kind of row: one over the variance of its noise, and rows per independent row.
+    """Inverse variance of the noise, and rows per independent row, for each kind of row.
 
     The weight is 0 for kinds with too few rows.
     """
@@ -301,8 +301,8 @@ def choose(equations: Equations, fixed: list[int], rows: RowWeights) -> OrderSel
     """Choose the orders by the extended Bayesian information criterion (Chen and Chen, 2008).
 
     Orders are added one by one; each is the one that lowers the sum of squares S most. The result
-    minimises N ln(S) + 2 k (ln N + ln K) for k orders of K candidates and N independent rows: of
-    the neighbouring rows, which contain the same noise, `rows.correlation` count as one.
+    minimises N ln(S) + 2 k (ln N + ln K) for k orders of K candidates and N independent rows.
+    Neighbouring rows contain the same noise, so `rows.correlation` of them count as one.
     """
     kinds = equations.parts
     used = rows.weight > 0.0
@@ -327,8 +327,8 @@ def _forward(
 ) -> tuple[list[int], FloatArray]:
     """Return the indices of the orders in the order of their addition, and the sums of squares.
 
-    The fixed columns are always included. After each addition the normal equations are those of
-    the remainders: the parts of columns and torque that the included columns do not explain.
+    The fixed columns are always included. After each addition, the normal equations contain only
+    the parts of columns and torque that the included columns do not explain.
     """
     columns = [*fixed, *range(design.FIXED, layout.columns)]
     first = len(fixed)
@@ -371,7 +371,7 @@ def rows_counted(equations: Equations) -> RowWeights:
 def rows_by_noise(
     equations: Equations, windows: Sequence[Windows], columns: list[int], beta: FloatArray
 ) -> RowWeights:
-    """Return the weights by the noise that a fit leaves, and the noise's correlation.
+    """Return the weights from the residual noise of a fit, and the correlation of that noise.
 
     N neighbouring rows with correlations r1, r2, ... count as N / (1 + 2 (r1 + r2 + ...)).
     """
@@ -392,7 +392,7 @@ def rows_by_noise(
 def _left(
     windows: Windows, layout: ColumnLayout, columns: list[int], beta: FloatArray
 ) -> FloatArray:
-    """Return what a fit of some columns of the layout leaves of the windows' torque."""
+    """Return the residual torque of the windows after a fit of some columns of the layout."""
     orders = tuple(layout.orders[(c - design.FIXED) // 2] for c in columns if c >= design.FIXED)
     part = ColumnLayout(orders[::2], layout.shape)
     fixed = [c for c in columns if c < design.FIXED]
@@ -402,7 +402,9 @@ def _left(
 
 
 def _correlated_sum(left: FloatArray) -> float:
-    """Return the sum of products of residuals at distances 1, 2, ... up to the uncorrelated."""
+    """Return the sum of products of residuals at distances 1, 2, ... until they are
+    uncorrelated.
+    """
     total, square = 0.0, float(left @ left)
     for distance in range(1, min(_MOST_CORRELATED, left.size // 4)):
         product = float(left[distance:] @ left[:-distance])
@@ -432,7 +434,7 @@ _HARMONIC_MODEL_ROUNDS = 2
 _LEAST_SHARE = 2.5e-3
 _INERTIA_CHANGE = 0.05
 _INERTIA_SHARE = 0.01
-"""Relative error of the inertia by unmodelled effects, such as the current loop's lag."""
+"""Relative error of the inertia due to unmodelled effects, such as the lag of the current loop."""
 
 
 def identify_harmonic_model(
@@ -444,9 +446,9 @@ def identify_harmonic_model(
 ) -> HarmonicResult:
     """Identify the motor from slow sweeps and short fast legs, best in both directions.
 
-    `inertia_kg_m2` is kept if no leg is fast enough to measure it; `latency_s` is the nominal
-    one (see compensation.AxisCompensation). Legs of one direction give the sum of cogging and one
-    friction, without the lag between directions. Raises IdentificationError for less than a turn.
+    `inertia_kg_m2` is kept if no leg is fast enough to measure it; `latency_s` is the nominal one
+    (see compensation.AxisCompensation). Legs in a single direction give only the sum of cogging and
+    friction, and not the lag between directions. Raises IdentificationError for less than a turn.
     """
     check_runs(legs)
     start = _Start(latency_s, pole_pairs, slots, inertia_kg_m2, None)
@@ -454,7 +456,7 @@ def identify_harmonic_model(
 
 
 def refine(before: HarmonicResult, run_legs: Sequence[SweepData]) -> HarmonicResult:
-    """Identify again from runs under PID and compensation; keep the values they do not show.
+    """Identify again from runs under PID and compensation; keep values that these do not determine.
 
     Friction, inertia and latency of `before` are priors with generous standard deviations; the
     cogging is fitted without a prior.
@@ -484,7 +486,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> HarmonicResult:
     windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
     directions = _directions(runs, windows)
     windows = windows if start.before else weighing(windows)
-    # one direction at low speed does not show the friction's curve apart from the cogging
+    # one direction at low speed cannot separate the friction's curve from the cogging
     curved = len(directions) == 2 or any(w.fast for w in windows)
     shape = start.before.shape if start.before else FrictionShape(0.25 if curved else 0.0)
     every = ColumnLayout(tuple(range(1, MAX_ORDER + 1)), shape)
@@ -541,7 +543,8 @@ def _directions(runs: Sequence[SweepData], windows: Sequence[Windows]) -> tuple[
 def weighing(windows: list[Windows]) -> list[Windows]:
     """Return the windows, with the inertia fitted on slow runs if no run is quick.
 
-    There hunting shows it, but with the errors of friction. It only keeps the cogging unbiased.
+    On slow runs, hunting reveals the inertia, but with errors due to friction. This value only
+    keeps the cogging unbiased.
     """
     if any(w.quick for w in windows):
         return windows
@@ -549,7 +552,7 @@ def weighing(windows: list[Windows]) -> list[Windows]:
 
 
 def _used(windows: list[Windows], directions: tuple[int, ...], start: _Start) -> list[int]:
-    """Return the columns, apart from the harmonics, that the runs can show."""
+    """Return the columns, apart from the harmonics, that the runs can determine."""
     fast = any(w.fast for w in windows)
     side = [0 if d > 0 else 1 for d in directions]
     used = [design.INERTIA] if any(w.weighs for w in windows) else []
@@ -573,7 +576,7 @@ def _choose(
 ) -> tuple[OrderSelection, FloatArray, float]:
     """Choose the orders and weight the kinds of rows, in some rounds.
 
-    Also return the harmonics' coefficients and the inertia, 0 if no run shows it.
+    Also returns the harmonics' coefficients and the inertia, 0 if no run determines it.
     """
     equations = design.accumulate(windows, every)
     fixed = [design.INERTIA, design.COULOMB, design.COULOMB + 1, design.VISCOUS]
@@ -593,7 +596,9 @@ def _choose(
 
 
 def explained(windows: Sequence[Windows]) -> tuple[float, float]:
-    """Return the share of the torque's squares that most orders leave, and the independent rows."""
+    """Return the residual share of squared torque with the most orders, and the independent
+    rows.
+    """
     every = ColumnLayout(tuple(range(1, _LAG_ORDERS + 1)), FrictionShape(0.0))
     equations = design.accumulate(windows, every)
     rows = rows_counted(equations)
@@ -713,7 +718,7 @@ def _result(
 
 
 def _inertia(fitted: HarmonicFit, start: _Start, quick: bool) -> ConfidenceInterval:
-    """Return the inertia: of quick runs, or else the one known before."""
+    """Return the inertia from quick runs, or the previously known one."""
     if quick:
         rotor = _estimate(fitted, design.INERTIA)
     elif start.before is not None:
@@ -728,8 +733,8 @@ def _coulomb(
 ) -> tuple[list[ConfidenceInterval], float]:
     """Return Coulomb friction forward and backward, and its relative rise at standstill.
 
-    An unmeasured direction gets the friction of the other, with an interval from zero. Raises
-    IdentificationError for negative friction.
+    An unmeasured direction gets the friction of the other one, with a confidence interval from
+    zero. Raises IdentificationError for negative friction.
     """
     sliding = design.COULOMB in fitted.used or design.COULOMB + 1 in fitted.used
     level = design.COULOMB if sliding else design.CREEP
@@ -771,7 +776,7 @@ def _harmonic(fitted: HarmonicFit, which: int, start: _Start) -> Harmonic:
 
 
 def _seen(angles_rad: Sequence[FloatArray]) -> float:
-    """Return the share of the turn in which there are angles."""
+    """Return the share of the turn that contains angles."""
     seen = np.zeros(_BINS, np.bool_)
     for angle in angles_rad:
         turn = angle / TWO_PI
@@ -788,7 +793,7 @@ _SAME = 0.2
 def rms_deviation_rad(legs: Sequence[SweepData]) -> float:
     """Return the rms deviation from the set-point about its mean, the largest over the legs.
 
-    Only the last whole turns at constant speed count, to exclude the start. Raises
+    Only the last whole turns at constant speed are used, to exclude the start. Raises
     IdentificationError if no leg has a whole turn.
     """
     deviations = []
@@ -809,9 +814,9 @@ class SecondPass:
     """Refines a first result round by round; the best is the one with the smallest deviation.
 
     Each round: run ramps in both directions under `current`, then `add` the recorded legs. A
-    refinement from runs with hunting may be wrong: the deviation of the run under it decides.
-    It is `done` when a round is as good as the best before it, or after `MOST_ROUNDS`. `fast_legs`
-    are those of the first result, without the sweeps.
+    refinement from runs with hunting may be wrong, so the deviation of the next run under it
+    decides. The pass is `done` when a round is no better than the best one before, or after
+    `MOST_ROUNDS`. `fast_legs` are the legs of the first result without the sweeps.
     """
 
     def __init__(self, first: HarmonicResult, fast_legs: Sequence[SweepData]) -> None:

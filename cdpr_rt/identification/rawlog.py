@@ -35,7 +35,7 @@ class RawLog:
     header: dict[str, Any]
     rows: FloatArray
     complete: bool
-    """Whether the file holds as many rows as its writer recorded at the end."""
+    """Whether the file contains all rows that its writer counted at the end."""
 
     def column(self, name: str, axis: int = 0) -> FloatArray:
         """Return one column, (samples,); raises RawLogError when the file has no such column."""
@@ -117,7 +117,7 @@ def read_raw_log(path: Path) -> RawLog:
     samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:
         raise RawLogError(f"{path}: contains no complete row of measurements")
-    # without a copy: a sweep's file is large, and so are the arrays computed from it
+    # without a copy, because the file of a sweep and the arrays computed from it are large
     values = np.frombuffer(data, "<f8", samples * len(columns), offset=_HEADER_BYTES)
     rows = values.reshape(samples, len(columns))
     return RawLog(path, header, rows, complete=header.get("rows") == samples)

@@ -31,7 +31,7 @@ class Harmonic:
     sine_Nm: float
     amplitude_Nm: ConfidenceInterval
     phase_deg: ConfidenceInterval
-    """Of amplitude·sin(order·θ + phase)."""
+    """Phase of amplitude·sin(order·θ + phase)."""
     per_pole_pair: float
     hint: str
 
@@ -48,7 +48,8 @@ class HarmonicResult:
     viscous_Nms_rad: ConfidenceInterval
     inertia_kg_m2: ConfidenceInterval
     inertia_measured: bool
-    """Whether it was measured; otherwise no run was fast enough and the given value was kept."""
+    """Whether the inertia was measured; otherwise no run was fast enough and the given value was
+    kept."""
     latency_s: ConfidenceInterval
     lag_rad: ConfidenceInterval
     """Static part of the lag: half the shift between the curves of the two directions."""

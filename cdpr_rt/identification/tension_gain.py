@@ -24,7 +24,7 @@ LEAST_SPAN = 2.0
 
 
 class CalibrationRefusedError(ControlError):
-    """The measurements do not support a calibration; the message says why and what helps."""
+    """The measurements do not support a calibration; the message gives the reason and a remedy."""
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,9 @@ _FAST = 4.0
 def runaway(stretch: Stretch) -> BoolArray:
     """Return at which samples the rotor runs away from the ramp, (stop - start,).
 
-    Two signs (Tremblay, section 1.4.2): the position error, and with it the proportional
-    controller's torque, has the sign that brakes; or the rotor moves by `_SPAN_rad` at several
-    times the ramp's speed or against it.
+    There are two criteria (Tremblay, section 1.4.2). Either the position error, and so the
+    proportional controller's torque, has the braking sign. Or the rotor moves by `_SPAN_rad` at
+    several times the ramp's speed, or against it.
     """
     run, part = stretch.run, slice(stretch.start, stretch.stop)
     ahead = stretch.direction * (run.angle_rad[part] - run.setpoint_rad[part])
@@ -104,8 +104,9 @@ class ThesisResult:
 def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
     """Identify one curve per direction from slow sweeps under the proportional controller.
 
-    Only whole turns at constant set-point velocity count. A direction without any gets the
-    variation of the other and the opposite mean. Raises IdentificationError if both have none.
+    Only whole turns at constant set-point velocity are used. A direction without whole turns gets
+    the variation of the other one and the opposite mean. Raises IdentificationError if neither has
+    whole turns.
     """
     check_runs(legs)
     whole = [t for s in stretches(legs) if (t := s.last_whole_turns()) is not None]
@@ -149,7 +150,7 @@ def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:
         count += np.bincount(place, minlength=GRID)
     seen = count > 0
     share = lost / np.maximum(count, 1.0)
-    sound = lost < count  # if some samples are sound, average only these
+    sound = lost < count  # if some samples are valid, average only these
     total, count = (
         np.where(sound, total - runaway_torque, total),
         np.where(sound, count - lost, count),

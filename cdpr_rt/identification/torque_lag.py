@@ -1,4 +1,4 @@
-"""The low-pass filter in a drive's reading of its torque: removed, or found in a recording.
+"""The low-pass filter in a drive's torque reading: its removal, and its identification.
 
 A reading y of the torque u with the time constant T obeys T·y' + y = u.
 """
@@ -56,7 +56,7 @@ def with_lag(time_s: FloatArray, torque_Nm: FloatArray, lag_s: float) -> FloatAr
 def resampled(reading: Reading, lag_s: float, period_s: float) -> SweepData:
     """Return a run at a constant rate without the filter, with a set-point of constant speed.
 
-    The torque is averaged over the steps between the samples, so that none is lost.
+    The torque is averaged over the steps between the samples, so that no part of it is lost.
     """
     time = reading.time_s
     grid = np.arange(time[0], time[-1], period_s)
@@ -73,9 +73,9 @@ def resampled(reading: Reading, lag_s: float, period_s: float) -> SweepData:
 class FittedLag:
     """A filter found in recordings.
 
-    `residual` is what the harmonics leave of the torque's squares, and `gain` that residual over
-    the one without a filter. A rotor that sticks and slips leaves too much: then the time constant
-    is not `reliable`.
+    `residual` is the share of squared torque that the harmonics do not explain, and `gain` the
+    ratio of this residual to that without a filter. Stick-slip leaves too large a residual; the
+    time constant is then not `reliable`.
     """
 
     lag_s: ConfidenceInterval
@@ -91,8 +91,8 @@ class FittedLag:
 def fit_torque_lag(readings: Sequence[Reading], period_s: float) -> FittedLag:
     """Return the filter's time constant.
 
-    Hunting, both directions, or different speeds show it: with a wrong time constant, the same
-    angle needs a different torque.
+    Hunting, both directions, or different speeds determine it, because with a wrong time constant
+    the same angle has different torques.
     """
 
     def unexplained(lag_s: float) -> tuple[float, float]:

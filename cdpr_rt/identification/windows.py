@@ -29,7 +29,7 @@ _SHORTEST_S = 0.25
 
 
 class IdentificationError(ControlError):
-    """The recorded runs do not show what is to be identified; the message says what is missing."""
+    """The recorded runs do not determine the wanted values; the message says what is missing."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ _SMOOTHING = 3.6
 _LEAST_NOISE_rad = 1e-6
 _SMOOTHING_SPEED_rad_s = 0.3
 _GAUSSIAN_WIDTH = 3.54
-"""Independent values in a Gaussian filter, over its standard deviation: 2·sqrt(pi)."""
+"""Independent values in a Gaussian filter per standard deviation: 2·sqrt(pi)."""
 _SAMPLED = np.array([1.0, 10.0, 1.0]) / 12.0
 _HELD = np.array([1.0, 6.0, 1.0]) / 8.0
 """Weights that convert averages over samples to averages over time in the second difference: two
@@ -138,7 +138,7 @@ _RELAXED_rad = 0.02
 _PLAY = 3.0
 _QUASI_STATIC_rad_s = np.deg2rad(10.0)
 _CLEAR = 5.0
-"""Acceleration over the encoder's noise in it, so that the noise hardly biases the inertia."""
+"""Ratio of acceleration to its encoder noise, above which the noise hardly biases the inertia."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Windows:
     speed_rad_s: FloatArray
     """Mean velocity, signed."""
     direction: FloatArray
-    """Its sign."""
+    """Sign of the mean velocity."""
     moving: BoolArray
     """Whether the rotor slides along with the set-point; in a sweep it may stick for moments."""
     quasi_static: bool
@@ -218,11 +218,11 @@ def _odd(x: float) -> int:
 
 
 def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Windows | None:
-    """Cut one contiguous run into windows; None if it is too short for any.
+    """Cut one contiguous run into windows; None if it is too short for a window.
 
-    `latency_s` is the time from the instant an angle was true to the mean instant at which the
-    torque sent in that cycle acts: an angle belongs to the torque sent one latency earlier.
-    `spacing_s` is the distance of windows, chosen by the run's speed if not given.
+    `latency_s` is the time from the sampling of an angle to the mean time at which the torque sent
+    in that cycle acts: an angle belongs to the torque sent one latency earlier. `spacing_s` is the
+    distance of windows; by default it depends on the run's speed.
     """
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
@@ -273,7 +273,9 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
 
 
 def _smoothing_s(noise_rad: float, speed_rad_s: float, least_s: float, most_s: float) -> float:
-    """Return the standard deviation of the filter of a run's deviation from its set-point."""
+    """Return the standard deviation of the smoothing filter for a run's deviation from its
+    set-point.
+    """
     quick = speed_rad_s > _QUICK_rad_s
     wanted_s = _SMOOTHING * noise_rad / (speed_rad_s if quick else _SMOOTHING_SPEED_rad_s)
     return min(max(wanted_s, least_s if quick else _SMOOTHING_s), most_s)
@@ -288,7 +290,9 @@ def _smoothed(run: SweepData, width: float, period: float) -> tuple[FloatArray, 
 
 
 def _smoothed_torque(run: SweepData, latency: float, step: int) -> FloatArray:
-    """Return the acting torque, some cycles after it was sent, smoothed over windows."""
+    """Return the torque at the time when it acts, some cycles after sending, smoothed over
+    windows.
+    """
     cycle = np.arange(run.time_s.size)
     torque = np.convolve(np.interp(cycle - latency, cycle, run.torque_Nm), _HELD, mode="same")
     for _ in range(4):
@@ -647,7 +651,9 @@ def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> Flo
 
 
 def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
-    """Number the rows of each run by the run's speed, because noise differs; -1 is left out."""
+    """Number the kinds of rows by the speed of their run, because noise differs; -1 means left
+    out.
+    """
     speeds = sorted({round(float(np.rad2deg(w.cruise_rad_s)), 1) for w in windows})
     numbered = []
     for w in windows:

@@ -28,27 +28,27 @@ _ANOTHER = "another command came after it"
 _OBEYED = "accepted; its end is not reported"
 _MOVING = frozenset({"enable", "program", "set"})
 _CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
-"""Commands that change what runs."""
+"""Commands that change the state or the running program."""
 
 
 @dataclass(frozen=True)
 class _Deferred:
-    """A command that is being prepared beside the cycles."""
+    """A command whose preparation runs in parallel with the cycles."""
 
     command: Command
     task: Task[None]
     program: Program
     state: LoopState
-    """State when the command came; `program` is the one that ran then."""
+    """State when the command arrived; `program` is the program that ran at that time."""
 
 
 class CommandDispatcher:
-    """Takes commands, refuses those that the state forbids, and replies once to each.
+    """Takes commands, rejects those that the state forbids, and replies once to each.
 
-    A command that needs preparation, such as reading a file, is deferred until that is done, and
-    then dispatched again. It is cancelled if another command, or for example a hold by the
-    supervisor, changes state or program meanwhile. Stops come from the service through the shared
-    memory, and from local clients through `stops`.
+    A command that needs preparation, such as reading a file, is deferred until the preparation is
+    done, and then dispatched again. It is cancelled if state or program change during that time,
+    because of another command or, for example, a hold by the supervisor. Stops come from the
+    service through the shared memory, and from local clients through `stops`.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class CommandDispatcher:
         self._request_stop = request_stop
         self._stops = stops
         self._void = 0
-        """Commands up to this number came before a stop from `stops`."""
+        """Commands up to this number arrived before a stop from `stops`."""
         self._deferred: _Deferred | None = None
         self._replies: list[tuple[int | StopRequest, CommandRefusal | str]] = []
         self._counters = engine.block.counters
-        # read in every cycle: a memoryview is faster
+        # a memoryview, because it is read in every cycle and faster
         queues = ("urgent", "urgent_taken", "commands", "commands_taken")
         self._urgent, self._urgent_taken, self._commands, self._commands_taken = (
             self._counters[name].data for name in queues
@@ -117,7 +117,7 @@ class CommandDispatcher:
     def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
         try:
             command = take()
-        except (ValueError, RecursionError):  # not JSON: there is no number to reply to
+        except (ValueError, RecursionError):  # not JSON, so there is no number for a reply
             taken[0] += 1
             return
         if isinstance(command, dict):
@@ -129,7 +129,7 @@ class CommandDispatcher:
         handler = self._handlers.get(do) if isinstance(do, str) else None
         answer = partial(self._reply, number if stop is None else stop)
         if do == "disable" and self._engine.reacting and self._runner.busy:
-            self._runner.listen(answer)  # in progress: replied to when the power is off
+            self._runner.listen(answer)  # in progress: the reply follows when the power is off
             return
         try:
             if handler is None:
@@ -141,12 +141,12 @@ class CommandDispatcher:
         except ControlError as error:
             answer(refusal_of(error) or str(error))
             return
-        except Exception as error:  # whatever a command contains, the loop continues
+        except Exception as error:  # the loop continues for every content of a command
             answer(f"{do}: {type(error).__name__}: {error}")
             return
         deferred = self._deferred
         if deferred is not None and deferred.command is command:
-            return  # replied to when it is resumed
+            return  # the reply follows when the command is resumed
         if deferred is not None and do != "lengths":
             self._cancel(deferred, _ANOTHER)
         if do in _CHANGING:
@@ -170,17 +170,19 @@ class CommandDispatcher:
         return True
 
     def _is_superseded(self, deferred: _Deferred) -> bool:
-        """Return whether the robot's state or program has changed since the command came."""
+        """Return whether the robot's state or program has changed since the command arrived."""
         engine, state = self._engine, self._life.state
         changed = engine.program is not deferred.program or state is not deferred.state
         return changed or engine.reacting is not Reaction.NONE
 
     def _resume(self, deferred: _Deferred) -> None:
-        """Dispatch a command whose preparation has ended, or reply why it has failed."""
+        """Dispatch a command whose preparation has ended, or reply why the preparation has
+        failed.
+        """
         self._deferred = None
         try:
             deferred.task.result()
-        except Exception as error:  # whatever a file contains, the loop continues
+        except Exception as error:  # the loop continues for every content of a file
             mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
             said = refusal_of(error) or f"{mistake}{error}"
             self._reply(_number(deferred.command), said)
@@ -193,10 +195,10 @@ class CommandDispatcher:
         self._reply(_number(deferred.command), f"cancelled: {why}")
 
     def send_replies(self) -> None:
-        """Reply to the commands that were completed, refused or cancelled since the last call.
+        """Reply to the commands that were completed, rejected or cancelled since the last call.
 
-        Called after the status was published: a client that asks for the status after the reply
-        sees the effect of its command.
+        It is called after the status was published, so that a client that requests the status after
+        the reply sees the effect of its command.
         """
         for to, error in self._replies:
             self._send(to, error)
@@ -218,7 +220,7 @@ class CommandDispatcher:
                 self._engine.block.post_reply({"to": to, **reply})
                 return
             except SharedBlockError:
-                continue  # too long, or the queue is full
+                continue  # the reply is too long, or the queue is full
 
     # -- handlers: each acts immediately, or returns the steps of a transition
 
@@ -271,7 +273,7 @@ class CommandDispatcher:
             return
         self._engine.switch(name, self._arguments(command), right)
         if name != HOLD:
-            self._life.clear_reason()  # that of the last hold
+            self._life.clear_reason()  # the reason of the last hold
 
     def _set(self, command: Command) -> None:
         self._require_running("set")
@@ -321,7 +323,7 @@ class CommandDispatcher:
             raise RefusedError(f"{transition.name.lower()}: {self._occupied()}")
 
     def _occupied(self) -> str:
-        """Return why the loop accepts no command at present, "" if it does."""
+        """Return the reason why the loop accepts no command at present, or ""."""
         if self._engine.reacting:
             why = f" ({reason})" if (reason := self._life.reason) else ""
             return f"the robot is stopping{why}, and lowers a platform; then the power goes off"

@@ -47,7 +47,7 @@ _CODES: Final = {
     "<u8": "Q", "<i8": "q", "<f8": "d", "<u4": "I", "<i4": "i", "<u2": "H", "<i2": "h", "<u1": "B",
     "?": "?",
 }  # fmt: skip
-"""Codes of `struct` by those of NumPy."""
+"""Type codes of `struct` for those of NumPy."""
 _SCALARS = struct.Struct("<" + "".join(_CODES[field.kind] for field in SCALAR_FIELDS))
 _scalars_of = attrgetter(*(field.source for field in SCALAR_FIELDS))
 _axes_of = attrgetter(*(field.source for field in AXIS_FIELDS))
@@ -88,7 +88,7 @@ class CycleRows:
         self._written = int(block.counters["rows"][0])
         shape, at = (self._capacity, len(POSE_FIELDS), 7), self._offset(POSE_FIELDS[0])
         self._poses = np.ndarray(shape, "<f8", self._raw, at, (self._size, 7 * 8, 8))
-        # compiled here, not in a cycle
+        # this call compiles the kernel before the first cycle
         self._bind(tuple(np.zeros(n, field.kind) for field in AXIS_FIELDS))
 
     def _offset(self, field: CycleField) -> int:
@@ -123,7 +123,7 @@ class CycleRows:
         self._writer.commit()
 
 
-# The parts of a control loop, without the machine that it runs.
+# The parts of a control loop except the machine that it runs.
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Lowering:
     program: str
     """Name of the program; with `{"blind": true}` it lowers without a pose."""
     longest_s: float
-    """The longest time that it may take."""
+    """Longest time that lowering may take."""
 
 
 @dataclass(frozen=True)
@@ -147,22 +147,23 @@ class LoopParts:
     axis_names: Sequence[str] = ()
     """Names of the axes in messages."""
     lengths_disagree: Callable[[], tuple[float, int, float, int]] | None = None
-    """Returns the largest normalised residual of cable lengths, m, and its cable, or -1; then the
-    largest sudden change of a residual, and its cable, or -1."""
+    """Function that returns the largest normalised residual of cable lengths, m, and its cable, or
+    -1; then the largest sudden change of a residual, and its cable, or -1."""
     length_suspects: Suspects = no_suspects
-    """Returns the axes whose cables may contradict the others, the likeliest first."""
+    """Function that returns the axes whose cables may contradict the others, the most likely
+    first."""
     lowering: Lowering | None = None
     """Lowering of the platform, None for a robot without such a program."""
     last_stop: LastLengths | None = None
-    """Stores the cables' lengths of the last stop, if a start can use them."""
+    """Stores the cable lengths of the last stop, if the next start can use them."""
     paths: PathStore | None = None
     """The planned paths of a robot with a platform."""
     notices: Callable[[], Sequence[str]] = tuple
-    """Returns notices to the operator, in addition to the state."""
+    """Function that returns notices to the operator, in addition to the state."""
     before_power: Callable[[], object] = lambda: None
-    """Called before the drives get power; may wait for files."""
+    """Function called before the drives get power; may wait for files."""
     enable_realtime: Callable[[], Sequence[str]] = tuple
-    """Called once before the first paced cycle; returns notices of denied settings."""
+    """Function called once before the first paced cycle; returns notices of denied settings."""
 
 
 # The loop's state, its faults, and the transitions that are allowed.
@@ -174,7 +175,7 @@ _MOST_FAULTS = 17
 
 
 class RefusedError(ControlError):
-    """A command was refused for the reason given; nothing has changed."""
+    """A command was rejected for the given reason; nothing has changed."""
 
 
 class Lifecycle:
@@ -185,9 +186,10 @@ class Lifecycle:
         self.state = LoopState.UNCONFIGURED
         self.since_ns = time.monotonic_ns()
         self.note = ""
-        """Why the motion ended or was held, or a transition failed, if it was no fault."""
+        """Reason why the motion ended or was held, or a transition failed, if there was no
+        fault."""
         self.faults: dict[Key, Fault] = {}
-        """By key: the fault that ended or held the motion, then further ones."""
+        """Faults by key: the one that ended or held the motion, then further ones."""
         self.reaction = Reaction.NONE
         """Reaction to the first of the faults."""
         self.earlier: tuple[str, frozenset[Key]] = "", frozenset()
@@ -202,12 +204,12 @@ class Lifecycle:
 
     @property
     def ends_motion(self) -> bool:
-        """Whether the cause ends the motion."""
+        """Whether the first fault ends the motion."""
         return self.reaction > Reaction.HOLD
 
     @property
     def reason(self) -> str:
-        """Why the motion ended or was held, or the robot is not ready, as text; "" for nothing."""
+        """Reason why the motion ended or was held, or the robot is not ready, as text, or ""."""
         first, *others = self.faults.values() or (None,)
         told = [] if first is None else [first, *(f for f in others if f.code in IN_REASON)]
         text = "; ".join(filter(None, (self.note, *map(self.text, told))))
@@ -216,7 +218,7 @@ class Lifecycle:
 
     @property
     def reason_limit(self) -> dict[str, Any] | None:
-        """The cause and the reaction to it for programs, None without one."""
+        """The cause and the reaction to it, in the form for programs; None without a cause."""
         cause = self.cause
         if cause is None:
             return None
@@ -250,7 +252,7 @@ class Lifecycle:
             self.changed = True
 
     def set_reason(self, reason: str) -> None:
-        """Set why the motion ended or was held, unless `faults` already give the reason."""
+        """Set the reason why the motion ended or was held, unless `faults` already give it."""
         if reason == self.reason:
             return
         if not self.ends_motion:
@@ -265,8 +267,8 @@ class Lifecycle:
     def add_fault(self, fault: Fault, *, as_cause: bool = False) -> None:
         """Add a further fault; `as_cause` if all others follow from it.
 
-        A drive's fault replaces one that it explains. A known fault gets the new figures, but the
-        status is not published for that, because a value may rise in every cycle. There are about
+        A drive's fault replaces the fault that it explains. A known fault gets the new values, but
+        this does not publish the status, because a value may rise in every cycle. There are about
         17 faults at most, so the status stays short.
         """
         faults, said = list(self.faults.values()), fault.code in IN_REASON
@@ -292,15 +294,16 @@ IDLE: Final = "idle"
 HOLD: Final = "hold"
 TURN_S: Final = 0.005
 _TOO_OLD_S: Final = 0.1
-"""Maximum age of answers: no torque is sent that was computed from older ones."""
+"""Maximum age of answers; a torque computed from older answers is not sent."""
 """Duration of a turn while no cycles run."""
 
 Judge = Callable[[Cycle, FloatArray], int]
-"""Limits the torque, (n,) in place, and returns the reaction to exceeded limits and faults."""
+"""Function that limits the torque, (n,) in place, and returns the reaction to exceeded limits and
+faults."""
 
 
 class Engine:
-    """Runs the machine's axes under the active program; knows neither commands nor stops.
+    """Runs the machine's axes under the active program; does not handle commands or stops.
 
     A cycle allocates no memory that stays and does not log. It waits only in its exchange: for its
     deadline, and for the axes' answers.
@@ -321,11 +324,13 @@ class Engine:
         self.program = parts.programs[IDLE]
         self.program_number = 0
         self.commanded = ""
-        """The last command that decided what runs, and its sender: "hold by user@host"."""
+        """The last command that selected the running program, and its sender: "hold by
+        user@host"."""
         self.last_program = self.program
-        """The program of the last cycle, even if the verdict has replaced it since."""
+        """The program of the last cycle, even if the supervisor's reaction has replaced it
+        since."""
         self.program_fault: Fault | None = None
-        """The exception of the program in this cycle, or that it took too long."""
+        """The exception raised by the program in this cycle, or the fault that it took too long."""
         self.program_s = 0.0
         """Time that the program took in this cycle, 0 in lockstep."""
         self.setpoint = Setpoint(block.n)
@@ -339,7 +344,7 @@ class Engine:
         self.cycle: Cycle | None = None
         self.notices: list[str] = []
         self.lost_bus: Fault | None = None
-        """A lost bus, without which cycles cannot continue."""
+        """The exception of a lost bus, without which cycles cannot continue."""
         self.exchange_s = 0.0
         """Time from the last SYNC to its last answer."""
         self.compute_s = 0.0
@@ -351,7 +356,7 @@ class Engine:
         self.reaction = self.limit = 0
         """Reaction of the supervisor in the last cycle, and the limit that caused it."""
         self.limit_axis = -1
-        """Axis that exceeded it, -1 if there is no single axis."""
+        """Axis that exceeded that limit, -1 if there is no single axis."""
         self.lengths_disagree_m = math.nan
         """Largest normalised residual of a platform's cable lengths, nan without power."""
         self.right = RightToMove(block, clock_ns)
@@ -359,9 +364,9 @@ class Engine:
         self._rows = CycleRows(block)
 
     def start_cycles(self) -> None:
-        """Run cycles from the next turn on, with the device that the machine has opened."""
+        """Run cycles from the next turn on, with the device opened by the machine."""
         device = self.machine.device
-        assert device is not None  # it has been opened
+        assert device is not None  # the device has been opened
         if not device.lockstep and not self._realtime:
             self._realtime = True
             self.notices += self.parts.enable_realtime()
@@ -387,7 +392,7 @@ class Engine:
         """Exchange with the axes, run the program, supervise its torque, send and record it.
 
         In lockstep, `is_quiet` returns whether nothing else is sent before the next cycle, which
-        follows immediately: its SYNC then goes out now.
+        follows immediately. If so, the SYNC of that cycle goes out now.
         """
         cycle, machine = self.cycle, self.machine
         assert cycle is not None  # cycles run
@@ -425,7 +430,7 @@ class Engine:
         self.asked_Nm[:] = torque
         self.reaction = judge(cycle, torque)
         if machine.clock.now_s - came_s > _TOO_OLD_S:
-            torque[:] = 0.0  # the process was stopped, and its drives gave up meanwhile
+            torque[:] = 0.0  # the process was suspended, and its drives stopped in the meantime
         try:
             cycle.transmit()
             if is_quiet is not None and is_quiet():
@@ -450,7 +455,7 @@ class Engine:
     # -- programs
 
     def drive(self) -> None:
-        """Hold the axes, whose drives are now enabled."""
+        """Hold the axes after their drives have been enabled."""
         self.parts.supervisor.reset()
         self.driving = True
         self.switch(HOLD)
@@ -464,7 +469,7 @@ class Engine:
         self.switch(HOLD)
 
     def switch(self, name: str, arguments: Mapping[str, Any] | None = None, right: int = 0) -> None:
-        """Change to another program; raises ProgramError and changes nothing then.
+        """Change to another program; if it raises ProgramError, nothing changes.
 
         `right` is the number of the grant of the right to move under which it runs, 0 for none.
         """
@@ -488,14 +493,14 @@ class Engine:
 
 Steps = Iterator[None]
 Listener = Callable[[CommandRefusal | str], None]
-"""Called at the end of a transition with the error, "" if it succeeded."""
+"""Function called at the end of a transition with the error, "" if it succeeded."""
 
 
 class TransitionRunner:
     """Advances a transition's steps, one per turn, and the tasks that they wait for.
 
-    A transition is a generator. It may be dropped at any `yield` in favour of another one. If it
-    fails it raises ControlError, whose text goes to its listeners.
+    A transition is a generator. Another transition may replace it at any `yield`. If it fails, it
+    raises ControlError, whose text is passed to its listeners.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -511,7 +516,7 @@ class TransitionRunner:
         return self._steps is not None
 
     def begin(self, steps: Steps, listener: Listener | None = None) -> None:
-        """Advance `steps` once per turn from now on, in place of any other."""
+        """Advance `steps` once per turn from now on, in place of any other transition."""
         before, self._steps = self._steps, steps
         if before is not None:
             self._tell(f"cancelled: {self._engine.life.reason or 'another command came first'}")
@@ -524,7 +529,7 @@ class TransitionRunner:
         self._listeners.append(listener)
 
     def advance(self) -> None:
-        """Advance by a step; raises any exception but ControlError."""
+        """Advance by one step; raises any exception except ControlError."""
         steps = self._steps
         if steps is None:
             return
@@ -539,7 +544,7 @@ class TransitionRunner:
             raise
 
     def _end(self, steps: Steps, error: CommandRefusal | str) -> None:
-        if self._steps is steps:  # it may have begun another
+        if self._steps is steps:  # the step may have begun another transition
             self._steps = None
             self._tell(error)
         self._engine.life.changed = True
@@ -553,22 +558,26 @@ class TransitionRunner:
 
     @property
     def task_running(self) -> bool:
-        """Whether a task runs beside the cycle."""
+        """Whether a task runs in parallel with the cycles."""
         return self._task is not None and not self._task.done
 
     def start(self, work: Callable[[], Any]) -> Task[Any]:
-        """Start `work` as a task beside the cycle; it runs immediately up to its first wait."""
+        """Start `work` as a task in parallel with the cycles; it runs immediately until its first
+        wait.
+        """
         self._task = task = self._clock.start(work)
         self._clock.run_tasks()
         return task
 
     def cancel(self) -> None:
-        """Cancel the task at its present wait."""
+        """Cancel the task at the point where it waits."""
         if self._task is not None:
             self._task.cancel()
 
     def run_task(self, work: Callable[[], Any]) -> Steps:
-        """Run `work`, which may wait, as a task beside the cycle; raises what it raises."""
+        """Run `work`, which may wait, as a task in parallel with the cycles; raises its
+        exception.
+        """
         task = self.start(work)
         while not task.done:
             yield

@@ -1,4 +1,4 @@
-"""The control loop: one turn after the other, in every state of the robot."""
+"""The control loop: it makes one turn after the other, in every state of the robot."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ _PACE_NS = 3_000_000_000
 
 
 class SimulationPace:
-    """Bus time over wall-clock time, over the last three to six seconds."""
+    """Ratio of bus time to wall-clock time, over the last three to six seconds."""
 
     def __init__(self) -> None:
         self._marks: list[tuple[int, float]] = []
-        """Up to two times at the wall and at the bus, at least three seconds apart."""
+        """Up to two pairs of wall-clock and bus time, at least three seconds apart."""
 
     def factor(self, wall_ns: int, bus_s: float) -> float | None:
         """Return the real-time factor, rounded; None until it has been measured."""
-        if self._marks and bus_s < self._marks[-1][1]:  # another simulator
+        if self._marks and bus_s < self._marks[-1][1]:  # a new simulator has started
             self._marks = []
         if not self._marks or wall_ns - self._marks[-1][0] >= _PACE_NS:
             self._marks = [*self._marks[-1:], (wall_ns, bus_s)]
@@ -72,10 +72,10 @@ class StatusPage:
         self._written: dict[str, Any] = {}
         self._pace = SimulationPace()
         self._failure = ""
-        """Program that failed last and why, until another one moves the robot."""
+        """Program that failed last and the reason, until another program moves the robot."""
 
     def update(self) -> None:
-        """Publish changes; called every turn."""
+        """Publish the status if it has changed; called every turn."""
         now_ns = self._clock_ns()
         if self._life.changed or now_ns - self._checked_ns > _CHECK_NS:
             self._life.changed = False
@@ -89,14 +89,14 @@ class StatusPage:
             return
         try:
             self._engine.block.write_status(status)
-        except (SharedBlockError, TypeError, ValueError):  # the program's progress is too long
+        except (SharedBlockError, TypeError, ValueError):  # the progress of the program is too long
             self._publish_short(status)
         self._written = status
 
     def _publish_short(self, status: Mapping[str, Any]) -> None:
         """Write only the parts that are always short; if that fails, readers keep the last status.
 
-        A loop does not end because its status cannot be published.
+        A status that cannot be published must not end the loop.
         """
         less: dict[str, Any] = {
             "program_progress": {},
@@ -115,11 +115,11 @@ class StatusPage:
     def _progress(self) -> dict[str, Any]:
         try:
             return dict(self._engine.program.progress())
-        except Exception as error:  # a motion does not end either
+        except Exception as error:  # this must not end a motion either
             return {"error": f"{type(error).__name__}: {error}"}
 
     def _note_failure(self, progress: Mapping[str, Any]) -> None:
-        """Store why a program fails: its client then ends it, and its progress is lost."""
+        """Store why a program fails, because its client then ends it and its progress is lost."""
         name, trouble = self._engine.program.name, progress.get("trouble")
         if trouble and progress.get("done") != 1.0:
             self._failure = f"{name}: {trouble}"
@@ -178,9 +178,9 @@ _NOT_LOWERED: Final = "; the platform was not lowered"
 
 
 class ControlLoop:
-    """Runs the machine's axes until it is ended; shares nothing but `block`.
+    """Runs the machine's axes until it is shut down; shares only `block` with other processes.
 
-    In a cycle it checks torque, drives and safety I/O, and `SafeStop` reacts. Commands are taken
+    In each cycle it checks torque, drives and safety I/O, and `SafeStop` reacts. Commands are taken
     after the cycle's torques have been sent. Each turn advances a transition and the tasks, which
     wait for answers on a bus. The expiry of the right to move and the period of the status follow
     `clock_ns`, by default CLOCK_MONOTONIC. `stops` is the socket through which local clients
@@ -213,11 +213,13 @@ class ControlLoop:
 
     @property
     def ended(self) -> bool:
-        """Whether it has been shut down."""
+        """Whether the loop has been shut down."""
         return self.transitions.ended
 
     def run(self) -> None:
-        """Boot, check, then turn until a request to end; the drives have no power afterwards."""
+        """Boot, check, then make turns until a request to end; the drives have no power
+        afterwards.
+        """
         try:
             self.runner.begin(self.transitions.start_up())
             while not self.ended:
@@ -230,8 +232,8 @@ class ControlLoop:
     def turn(self, another_follows: bool = False) -> None:
         """Run one cycle, or sleep; then stop requests, commands, transition, status and replies.
 
-        In lockstep, a caller that does nothing between this turn and the next tells it with
-        `another_follows`, so that the simulator computes meanwhile.
+        In lockstep, a caller that does nothing between this turn and the next sets
+        `another_follows`, so that the simulator can already compute.
         """
         self._alive[0] = time.monotonic_ns()
         engine = self.engine
@@ -263,7 +265,7 @@ class ControlLoop:
         )
 
     def request_stop(self) -> None:
-        """End the loop under control. For signal handlers."""
+        """End the loop with a controlled stop. For signal handlers."""
         self._stop_requested = True
 
     def request_power_off(self) -> None:
@@ -273,9 +275,9 @@ class ControlLoop:
     def _remove_power(self) -> None:
         life, state = self.life, self.life.state
         if state not in (LoopState.READY, LoopState.ACTIVE, LoopState.FAULT):
-            return  # drives that boot have no power: the request is latched once they are ready
+            return  # booting drives have no power; the request is latched later
         if state is LoopState.FAULT and self.runner.busy:
-            return  # it may be about to be acknowledged
+            return  # the fault may be about to be acknowledged
         self._power_off_requested = False
         if self.engine.machine.read_only:
             return
@@ -290,7 +292,7 @@ class ControlLoop:
     def _end(self) -> None:
         if self.runner.task_running:
             return
-        # again if there was a fault in between
+        # repeated if there was a fault in between
         if not self._stopping or not (self.runner.busy or self.transitions.ended):
             self._stopping = True
             self.runner.begin(self.transitions.shut_down())
@@ -334,14 +336,14 @@ class ControlLoop:
             safe_stop.react(Reaction(reaction), torque_Nm, drives)
         if engine.reacting > Reaction.HOLD:
             engine.machine.switch_off_lost()
-        # also for other axes in the cycle that begins the reaction, and for its cause
+        # includes other axes in the cycle that begins the reaction, and its cause
         if (drives or reaction > Reaction.HOLD) and (reacts or safe_stop.reacts_to_fault):
             safe_stop.note_further(drives)
         return reaction
 
 
 def _too_long(engine: Engine, allowed_s: float) -> Fault:
-    """Return the fault of a program that held up the loop, such as one with a user's controller."""
+    """Return the fault of a program that delayed the loop, such as one with a user's controller."""
     name, took_s = engine.last_program.name, engine.program_s
     return Fault(
         Limit.LATE, code=PROGRAM, source=f"program {name}", value=took_s, allowed=allowed_s,

@@ -1,4 +1,4 @@
-"""Interface of the control loop to drives, brakes and safety I/O; it knows no bus."""
+"""Interface of the control loop to drives, brakes and safety I/O, independent of the bus."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from cdpr_rt.errors import ControlError
 
 
 class MachineError(ControlError):
-    """The drives could not be booted, prepared or released; the message says which and why."""
+    """Drives could not be booted, prepared or released; the message gives the drive and the
+    reason.
+    """
 
 
 class Machine(Protocol):
     """The axes of one robot with their buses, brakes and safety I/O.
 
-    The slow methods are called in a task of `clock`, whether cycles run or not, and wait only with
-    it; they raise MachineError. All others are called in a cycle and never wait.
+    The slow methods are called in a task of `clock`, with or without running cycles. They wait only
+    by this clock, and raise MachineError. All other methods are called in a cycle and never wait.
     """
 
     failures: tuple[type[Exception], ...]
     """The exceptions that the device raises when a bus is lost."""
     read_only: bool
-    """Whether nothing is ever sent, because another master runs the axes."""
+    """Whether the machine never sends anything, because another master runs the axes."""
     watches: Sequence[Watch]
     notices: Sequence[str]
     """Notices about the booted drives, for the status."""
@@ -56,33 +58,37 @@ class Machine(Protocol):
         """Prepare a check: close the contactor, set the mode of operation."""
 
     def acknowledge(self) -> None:
-        """Acknowledge what the safety I/O has latched."""
+        """Acknowledge the latched alarms of the safety I/O."""
 
     def pause(self) -> None:
-        """Stop the cycles of the drives, which have no power, until `prepare`."""
+        """Stop the cycles of the unpowered drives until `prepare`."""
 
     def confirm_power_off(self) -> Sequence[Fault]:
-        """Remove the power of drives that do not answer; return those that do not confirm it."""
+        """Remove the power of drives that do not answer; return a fault for each that does not
+        confirm.
+        """
 
     def explain(self) -> Sequence[Fault]:
-        """Return what drives in fault and the safety I/O report now."""
+        """Return the faults that drives and the safety I/O report now."""
 
     def close(self) -> str:
-        """Remove the drives' power and leave the buses; return which drive does not confirm it."""
+        """Remove the drives' power and close the buses; return the drive that does not confirm, or
+        "".
+        """
 
     # -- in a cycle
 
     def read_tension(self) -> TensionFeedback | None:
-        """Return the tensions as last read, None if none are measured."""
+        """Return the last readings of tensions, None if they are not measured."""
 
     def bus_state(self) -> dict[str, Any]:
         """Return the known state of each bus, by its name."""
 
     def prepared(self) -> bool:
-        """Whether the drives confirm what `prepare` asked of them."""
+        """Whether the drives confirm the settings of `prepare`."""
 
     def unprepared(self) -> str:
-        """Return which drive does not confirm what `prepare` asked of it."""
+        """Return as text which drive does not confirm the settings of `prepare`."""
 
     def power_on(self) -> None:
         """Enable all drives; raises MachineError if one must not be enabled."""
@@ -97,16 +103,16 @@ class Machine(Protocol):
         """Command the drives' own quick stop, then switch-off, from this cycle's command on."""
 
     def powered(self) -> bool:
-        """Whether all drives have their power and obey."""
+        """Whether all drives have power and follow commands."""
 
     def unpowered(self) -> bool:
         """Whether no drive that answers has power, by its last answer."""
 
     def reset_faults(self) -> None:
-        """Clear latched alarms and reset the drives' faults in the cycles that follow."""
+        """Clear latched alarms and reset the drives' faults in the following cycles."""
 
     def intact(self) -> bool:
-        """Whether every drive answers and needs no new boot."""
+        """Whether every drive answers and does not need to boot again."""
 
     def faultless(self) -> bool:
         """Whether no drive is in fault."""

@@ -28,17 +28,19 @@ class Notifier(Protocol):
     """Receives reports on the progress of a procedure."""
 
     def note(self, text: str) -> None:
-        """Take a line about the present step."""
+        """Report a line about the present step."""
 
     def progress(
         self, what: str, total_s: float
     ) -> AbstractContextManager[Callable[[float], None]]:
-        """Return a function that takes the seconds of bus time that are done, of `total_s`."""
+        """Return a function that is called with the seconds of bus time done, out of `total_s`."""
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Limits of a motion in a procedure; a bare rotor may swing by turns without harm."""
+    """Limits of a motion in a procedure; a rotor without load may swing by several turns without
+    harm.
+    """
 
     following_error_rad: float = 4.0 * math.tau
     speed_rad_s: float | None = None
@@ -48,8 +50,8 @@ class Tolerance:
 class Operator:
     """Operates a loop that has a `TrackProgram`; its methods return when they are done.
 
-    `go_on` lets the loop run one turn. All raise TripError after the loop has ended the motion and
-    removed the power, and InterruptedMotionError as soon as `stop_requested`.
+    `go_on` makes the loop run one turn. All methods raise TripError if the loop has ended the
+    motion and removed the power, and InterruptedMotionError when `stop_requested` is true.
     """
 
     def __init__(
@@ -68,9 +70,9 @@ class Operator:
 
     @property
     def device(self) -> AxisDevice:
-        """The axes, which have booted."""
+        """The booted axes."""
         device = self._engine.machine.device
-        assert device is not None  # procedures begin later
+        assert device is not None  # procedures begin after the boot
         return device
 
     @property
@@ -95,7 +97,7 @@ class Operator:
     def reset(self) -> None:
         """Acknowledge faults; the drives are left without power."""
         if self._life.state is LoopState.ACTIVE:
-            with suppress(TripError):  # also acknowledges faults found on the way
+            with suppress(TripError):  # this also acknowledges faults found during the reset
                 self.disable()
         self._do(self._transitions.acknowledge())
 
@@ -115,18 +117,20 @@ class Operator:
             self._turn()
 
     def let_drive(self, done: Callable[[], bool], within_s: float, what: str) -> None:
-        """Let the drives move on their own, as in homing, until `done`; then they have no power."""
+        """Let the drives move autonomously, as in homing, until `done`; then remove their power."""
         self.enable()
         self._engine.driving = False  # the origin of an angle may change, so angles are not checked
         self.wait(done, within_s, what)
         self.disable()
 
     def between_cycles(self, work: Callable[[], object]) -> None:
-        """Do `work`, which may wait by the clock, while no cycles run and no drive has power."""
+        """Run `work`, which may wait by the clock, while no cycles run and no drive has power."""
         self._do(self._transitions.between_cycles(work))
 
     def run_task(self, work: Callable[[], _T]) -> _T:
-        """Return the result of `work`, which may wait by the clock, as a task beside the cycles."""
+        """Run `work`, which may wait by the clock, in parallel with the cycles; return its
+        result.
+        """
         task = self._runner.start(work)
         try:
             while not task.done:
@@ -137,7 +141,7 @@ class Operator:
         return result
 
     def run_blocking(self, work: Callable[[], _T]) -> _T:
-        """Return the result of `work`, which touches no bus and may take long."""
+        """Run `work`, which may take long and uses no bus; return its result."""
         return self.run_task(lambda: self._engine.machine.clock.run_blocking(work))
 
     def follow(
@@ -150,9 +154,10 @@ class Operator:
     ) -> None:
         """Run `controller` along `motion` to its end, or until `until` is true after a cycle.
 
-        Its cycles go into `log`; `on_progress` gets the motion's time now and then. However it
-        ends, the last torque is zero and the recorded cycles are in the file. A requested stop, or
-        one by a watch, ends it with the braking motion under the same controller.
+        The cycles are written to `log`. `on_progress` is called from time to time with the time of
+        the motion. The last torque is zero and the recorded cycles are in the file, however the
+        motion ends. A requested stop, or a stop by a watch, ends the motion with its braking ramp
+        under the same controller.
         """
         self._refuse_when_stopped("the motion")
         engine, track = self._engine, self._track

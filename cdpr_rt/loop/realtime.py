@@ -1,4 +1,4 @@
-"""Real-time settings of a process: scheduling, memory, core; with notices of denied settings."""
+"""Real-time settings of a process: scheduling, memory, core; and notices of denied settings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ def _schedule_fifo(also: int = 0) -> str:
 def freeze_memory() -> list[str]:
     """Lock memory, freeze the heap and turn the garbage collector off.
 
-    For a process that has allocated all it needs. Returns notices of denied settings, with remedy.
+    Call it when the process has allocated all that it needs. Returns notices of denied settings,
+    with the remedy.
     """
     notice = _lock_memory()
     gc.collect()
@@ -48,14 +49,14 @@ def freeze_memory() -> list[str]:
 
 
 def enable_realtime() -> list[str]:
-    """Give the calling thread SCHED_FIFO and a core, for the rest of the process' life.
+    """Give the calling thread SCHED_FIFO and a core until the process ends.
 
-    The core is an isolated one if possible; the interpreter's switch interval is shortened. Threads
-    started later are ordinary ones on its core. Returns notices of denied settings, with the
-    remedy.
+    The core is an isolated one if possible. The interpreter's switch interval is shortened. Threads
+    started later have normal priority on the same core. Returns notices of denied settings, with
+    the remedy.
     """
     notices = [_schedule_fifo(os.SCHED_RESET_ON_FORK)]
-    if not notices[0]:  # an ordinary thread had better move to another core than wait
+    if not notices[0]:  # without SCHED_FIFO it is better to move to another core than to wait
         notices.append(_take_core())
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     return [notice for notice in notices if notice]
@@ -70,13 +71,13 @@ def _take_core() -> str:
     isolated = _isolated_cores()
     if len(usable | isolated) < _CORES_NEEDED:
         return f"{len(usable)} core for everything: the loop has no separate core"
-    ordinary = sorted(usable - isolated)[1:]  # the first core is for the rest of the machine
+    ordinary = sorted(usable - isolated)[1:]  # the first core is left for the rest of the machine
     for core in (*sorted(isolated, reverse=True), *reversed(ordinary)):
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
             claim.bind(_CLAIM.format(core))
             os.sched_setaffinity(0, {core})
-        except OSError:  # claimed, or not in this control group
+        except OSError:  # the core is claimed, or not in this control group
             claim.close()
             continue
         _claims.append(claim)
@@ -124,9 +125,9 @@ def one_core(*others: int) -> Iterator[None]:
     """Keep this process and those with the identifiers `others` on one core in the block.
 
     In lockstep the controller and the simulator take turns, and a wake-up across cores costs more
-    than the work of a cycle. They run as batch processes, which do not interrupt each other, so
-    one turn takes the answers of several drives. A core serves one such block on this machine at
-    a time; if all cores are taken, the processes stay where they are.
+    than the work of a cycle. They run as batch processes, which do not interrupt each other, so the
+    controller reads the answers of several drives in one turn. A core serves one such block on this
+    machine at a time; if all cores are taken, the processes stay where they are.
     """
     before = os.sched_getaffinity(0)
     policy = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -144,7 +145,7 @@ def one_core(*others: int) -> Iterator[None]:
 
 @contextmanager
 def _free_core(usable: set[int]) -> Iterator[int | None]:
-    """Claim a free core and return it, or None; the kernel frees the claim."""
+    """Claim a free core and yield it, or None; the kernel releases the claim."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         for core in sorted(usable, reverse=True):
             try:

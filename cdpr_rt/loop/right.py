@@ -1,8 +1,8 @@
 """The right to move: a lease with a fencing token, in the shared memory.
 
-Every grant has a number, higher than all before, and an expiry time. A command or a sample counts
-only with the number of the current grant, so that nothing commanded under one grant continues under
-the next.
+Every grant has a number, higher than all numbers before, and an expiry time. A command or a sample
+is valid only with the number of the current grant. So a motion commanded under one grant does not
+continue under the next.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class PublishedRight:
         return int(self._number[0])
 
     def begin(self, until_ns: int) -> int:
-        """Publish a new grant that holds until then; return its number."""
+        """Publish a new grant that is valid until `until_ns`; return its number."""
         self._until_ns[0] = (
             0  # a reader in between sees no grant, not the new one with the old expiry
         )
@@ -59,7 +59,7 @@ class RightToMove:
     def current(self) -> int:
         """The number of the current grant, or 0.
 
-        An expiry more than `LONGEST_S` ahead is not the service's and counts as no grant.
+        An expiry more than `LONGEST_S` ahead cannot come from the service and counts as no grant.
         """
         number: int = self._number[0]
         left_ns = self._until_ns[0] - self._clock_ns()
@@ -77,14 +77,14 @@ class RightToMove:
         self._mover[0] = number
 
     def refusal(self, number: int) -> str:
-        """Return why a command with this number is rejected, "" if it is not."""
+        """Return the reason why a command with this number is rejected, or ""."""
         current = self.current
         if current == 0:
             return "nobody holds the right to move; take it first"
         return "" if number == current else "another client has the right to move now"
 
     def loss(self) -> str:
-        """Return why the program's grant is not the current one, "" while it is."""
+        """Return the reason why the program's grant is not the current one, or ""."""
         current = self.current
         if current == 0:
             return "nobody holds the right to move now"

@@ -31,7 +31,7 @@ class StopMethod(Enum):
     BRAKE = auto()
     """The program brakes, then holds the axes or lowers the platform."""
     LOWER_WITHOUT_POSE = auto()
-    """The winches that still work lower the platform, without using its pose."""
+    """The winches that still work lower the platform, without using the pose."""
     QUICK_STOP = auto()
     """The drives make their own quick stop."""
     TORQUE_OFF = auto()
@@ -80,11 +80,11 @@ class SafeStop:
     # -- ending a motion
 
     def note_further(self, drives: Sequence[Fault]) -> None:
-        """Add faults during the reaction to a fault; `drives` are those of drives.
+        """Add faults during the reaction to a fault; `drives` are faults of drives.
 
         Each drive is added once, and missed answers are part of its fault. Consequences for an axis
-        that has failed, such as its speed, are no further causes. A tension above its limit always
-        is one, with the highest value, and so is a cable that breaks from it.
+        that has failed, such as its speed, are not added. A tension above its limit is always
+        added, with the highest value, and so is a cable that breaks because of it.
         """
         life = self._life
         failed = [(fault.limit, fault.axis) for fault in life.faults.values()]
@@ -116,14 +116,14 @@ class SafeStop:
         """
         engine, supervisor, state = self._engine, self._supervisor, self._life.state
         if state not in (LoopState.READY, LoopState.ACTIVE):
-            return  # in a fault the cause is known already; the check of the bus has its own
-        # neither a controlled stop nor lowering is possible then
+            return  # in a fault the cause is known; the check of the bus has its own
+        # in these cases neither a controlled stop nor lowering is possible
         uncontrolled = engine.lost_bus or (
             self.without_pose and supervisor.limit is Limit.NOT_FINITE
         )
         if uncontrolled:
             reaction = max(reaction, Reaction.QUICK_STOP)
-        # without a pose it may be lowered fast, because its lengths are correct
+        # lowering without a pose may be fast, because the lengths are correct
         unreliable = supervisor.limit in (
             {Limit.ENCODER_JUMP} if self.without_pose else LENGTHS_UNRELIABLE
         )
@@ -137,7 +137,7 @@ class SafeStop:
             if engine.program.name != HOLD and engine.driving:
                 engine.hold(fault)
             return
-        if not self.reacts_to_fault:  # else it is a further cause
+        if not self.reacts_to_fault:  # otherwise the fault is a further cause
             self._life.set_cause(fault, supervisor.reaction)
             for other in drives:
                 self._life.add_fault(other)
@@ -151,7 +151,7 @@ class SafeStop:
             self.enter_fault()
 
     def _invalidates_lowering(self) -> bool:
-        """Whether the finding makes it unsafe to continue lowering the platform by its pose."""
+        """Whether the supervisor's finding makes it unsafe to lower the platform by its pose."""
         lowers_by_pose = self._engine.driving and self.lowers and not self.without_pose
         return lowers_by_pose and self._supervisor.limit in POSE_UNRELIABLE
 
@@ -188,7 +188,9 @@ class SafeStop:
             traceback.print_exception(mistake)  # afterwards, because writing may take long
 
     def _note_fall(self) -> None:
-        """Note that a platform falls, if no brakes hold it and it may hang on its cables."""
+        """Record that a platform falls, if no brakes hold it and it may be hanging on its
+        cables.
+        """
         last, lowering, engine = self._engine.parts.last_stop, self._lowering, self._engine
         if last is None or lowering is None or not self.lowers:
             return
@@ -196,7 +198,7 @@ class SafeStop:
         last.fallen = last.fallen or hangs or engine.program.name == lowering.program
 
     def _method(self, reaction: Reaction, then: LoopState) -> StopMethod:
-        """Return how to end the motion, depending on pose and drives."""
+        """Return the method to end the motion, depending on pose and drives."""
         if reaction is Reaction.QUICK_STOP:
             return StopMethod.QUICK_STOP
         if reaction is not Reaction.CONTROLLED_STOP or not self._engine.driving:
@@ -213,20 +215,20 @@ class SafeStop:
                 self._lower_without_pose()
             else:
                 self._engine.program.stop()
-        except Exception as error:  # any error of a program: the drives can still brake
+        except Exception as error:  # after any error of a program, the drives can still brake
             return error
         return None
 
     def _lower_without_pose(self) -> None:
         lowering = self._lowering
-        assert lowering is not None  # there is a platform to be lowered
+        assert lowering is not None  # this method requires a platform to lower
         if not self.without_pose:
             self.without_pose = True
-            self._note_fall()  # lost drives let it fall, and nothing measures where it lands
+            self._note_fall()  # it falls without drives, and no sensor measures where it lands
             self._engine.switch(lowering.program, {"blind": True})
 
     def enter_fault(self) -> None:
-        """Go to fault from a state without power."""
+        """Enter the state fault from a state without power."""
         self._runner.begin(self._fault_steps())
 
     # -- steps that take several cycles
@@ -249,13 +251,13 @@ class SafeStop:
             machine.set_brakes(False)
         yield from runner.wait_up_to(_POWER_OFF_S, machine.unpowered)
         machine.power_off()
-        yield  # at least one command, so that it is sent
+        yield  # wait at least one cycle, so that the command is sent
         yield from runner.wait_up_to(_POWER_OFF_AT_LAST_S, machine.unpowered)
         unconfirmed: list[Fault] = []
         yield from runner.run_task(lambda: unconfirmed.extend(machine.confirm_power_off()))
         for fault in unconfirmed:
             life.add_fault(fault)
-        if controlled or machine.has_brakes:  # without control it may have fallen
+        if controlled or machine.has_brakes:  # without control the platform may have fallen
             yield from self._keep_lengths()
         if any(fault.code in IN_REASON for fault in life.faults.values()):
             then = LoopState.FAULT
@@ -267,7 +269,7 @@ class SafeStop:
     def _brake(self) -> Steps:
         """Wait for standstill under the program, apply the brakes, remove the power.
 
-        A platform that no brakes would hold is lowered first; if it does not rest, that is a fault.
+        A platform without brakes is lowered first; if it does not come to rest, that is a fault.
         """
         engine, machine, wait_up_to = self._engine, self._machine, self._runner.wait_up_to
         lowering = self._lowering
@@ -276,7 +278,7 @@ class SafeStop:
             engine.switch(lowering.program if lowering is not None and self.lowers else HOLD)
         if lowering is not None and self.lowers:
             yield from wait_up_to(lowering.longest_s, self._at_rest)
-            with suppress(Exception):  # whatever a program raises, the power is removed
+            with suppress(Exception):  # the power is removed even if the program raises
                 if trouble := str(engine.program.progress().get("trouble", "")):
                     source = f"program {engine.program.name}"
                     self._life.add_fault(Fault(Limit.NONE, -1, PROGRAM, source, detail=trouble))
@@ -306,13 +308,13 @@ class SafeStop:
             self._engine.notices.append(str(error))
 
     def explain(self) -> Steps:
-        """Add the reports of drives and safety I/O; leave a lost bus."""
+        """Add the faults reported by drives and safety I/O; stop the cycles on a lost bus."""
         found: list[Fault] = []
         yield from self._runner.run_task(lambda: found.extend(self._machine.explain()))
         for fault in found:
             cause = self._life.cause
             by_drive = cause is None or cause.limit in IN_DRIVES_FAULT
-            # an open chain removes the drives' power
+            # an open safety chain removes the drives' power
             self._life.add_fault(fault, as_cause=by_drive and fault.limit is not Limit.DRIVE)
         if self._engine.lost_bus:
             yield from self.leave_cycles()

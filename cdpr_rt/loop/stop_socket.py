@@ -1,7 +1,7 @@
-"""The socket by which a stop reaches the loop without the service: both ends.
+"""Both ends of the socket by which a stop reaches the loop without the service.
 
-One datagram asks for one stop. It carries a descriptor through which the loop answers once, so the
-sender also sees when the loop ends without an answer.
+One datagram requests one stop. It carries a descriptor through which the loop answers once, so the
+sender also notices if the loop ends without an answer.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ STOP_SUFFIX: Final = ".stop"
 _MOST_BYTES: Final = 1024
 _MOST_REPLY_BYTES: Final = 1 << 16
 _MOST_UNANSWERED: Final = 32
-"""Descriptors kept for answers; a stop beyond these is obeyed and answered immediately."""
+"""Largest number of descriptors kept for answers; a further stop is carried out and answered
+immediately."""
 _CREDENTIALS: Final = struct.Struct("3i")  # struct ucred: pid, uid, gid
 _FD_BYTES: Final = array.array("i").itemsize
 _ANCILLARY: Final = socket.CMSG_SPACE(_CREDENTIALS.size) + socket.CMSG_SPACE(_FD_BYTES)
@@ -38,7 +39,8 @@ class StopRequest:
         self.do, self.client = do, client
         self._reply = reply
         self.is_surplus = False
-        """Whether too many stops wait for their answer to keep this one waiting."""
+        """Whether this stop must be answered immediately, because too many stops wait for an
+        answer."""
 
     @property
     def is_open(self) -> bool:
@@ -58,7 +60,7 @@ class StopSocket:
     """The loop's end: a datagram socket at `path`, for the loop's own user and root."""
 
     def __init__(self, path: Path) -> None:
-        """Replace what a killed loop has left at `path`. Raises OSError."""
+        """Replace a socket that a killed loop has left at `path`. Raises OSError."""
         self.path = path
         self._taken = 0
         self._last: StopRequest | None = None
@@ -96,7 +98,7 @@ class StopSocket:
         return request
 
     def figures(self) -> dict[str, Any]:
-        """Return how many stops were taken, the last stop and its sender."""
+        """Return the number of stops taken, the last stop and its sender."""
         last = self._last
         return {} if last is None else {"taken": self._taken, "do": last.do, "client": last.client}
 
@@ -109,7 +111,7 @@ class StopSocket:
 
 
 def _unpacked(ancillary: list[tuple[int, int, bytes]]) -> tuple[int | None, socket.socket | None]:
-    """Return the sender's user and the socket for the answer, None for each that is missing."""
+    """Return the sender's user and the socket for the answer; each is None if it is missing."""
     uid, reply = None, None
     for level, kind, data in ancillary:
         if level != socket.SOL_SOCKET:
@@ -146,10 +148,11 @@ class StopUnansweredError(Exception):
 
 
 def send_stop(path: Path, do: str, client: str, wait_s: float) -> dict[str, Any] | None:
-    """Ask the loop whose socket is at `path` for a stop; return its answer.
+    """Request a stop from the loop with its socket at `path`; return its answer.
 
-    None if no loop reads there, or if it ended without an answer. Raises StopUnansweredError if it
-    has not answered within `wait_s`, and PermissionError for another user's loop.
+    Returns None if no loop reads there, or if the loop ended without an answer. Raises
+    StopUnansweredError if the loop has not answered within `wait_s`, and PermissionError for
+    another user's loop.
     """
     request = json.dumps({"do": do, "client": client}).encode()
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

@@ -30,16 +30,16 @@ class Transitions:
         self._safe_stop = safe_stop
         self._machine, self._life = engine.machine, engine.life
         self.check_result: dict[str, Any] = {}
-        """Figures of the last check of the bus."""
+        """Results of the last check of the bus."""
         self.first_program = HOLD
         """The program that runs once the drives are enabled."""
         self.ended = False
         """Whether the loop has been shut down."""
         self.power_off_unconfirmed = ""
-        """Drive whose power-off is not confirmed at the end, as text."""
+        """Drive that has not confirmed its power-off at the end, as text."""
 
     def start_up(self) -> Steps:
-        """Boot and check; the reason of the fault is set if either fails."""
+        """Boot and check; if either fails, set the reason of the fault."""
         try:
             yield from self.configure()
             yield from self.check()
@@ -47,7 +47,7 @@ class Transitions:
             self._life.set_reason(str(error))
 
     def configure(self) -> Steps:
-        """Boot the drives; the state is then inactive, or unconfigured if it fails."""
+        """Boot the drives; the state is then inactive, or unconfigured if the boot fails."""
         life, machine, run_task = self._life, self._machine, self._runner.run_task
         self._engine.stop_cycles()
         if machine.device is not None:
@@ -64,7 +64,8 @@ class Transitions:
     # -- checking the bus
 
     def check(self, reset: bool = False) -> Steps:
-        """Run cycles without power and check every answer; then ready, or inactive if it fails.
+        """Run cycles without power and check every answer; then enter ready, or inactive on
+        failure.
 
         A drive in fault fails the check, unless `reset`.
         """
@@ -77,7 +78,7 @@ class Transitions:
         try:
             yield from self._runner.run_task(machine.prepare)
             if not machine.clock.lockstep:
-                gc.collect()  # the collector is off in paced cycles
+                gc.collect()  # the garbage collector is off in paced cycles
             engine.start_cycles()
             if reset:
                 yield from self._reset_faults()
@@ -93,10 +94,10 @@ class Transitions:
 
     def _reset_faults(self) -> Steps:
         machine = self._machine
-        for _ in range(_SETTLE_CYCLES):  # each drive reports its state meanwhile
+        for _ in range(_SETTLE_CYCLES):  # each drive reports its state in these cycles
             yield
         if not machine.intact():
-            return  # a drive that needs a new boot keeps its fault
+            return  # a drive that has to boot again keeps its fault
         machine.reset_faults()
         yield
         try:
@@ -119,7 +120,7 @@ class Transitions:
         limits = self._engine.parts.supervisor.limits
         allowed = cycles * device.n * limits.missed_in_window / limits.window_cycles
         missed = 0
-        # a delay of this machine ends, a bad bus stays bad
+        # delays of this computer end, but a bad bus stays bad
         for _ in range(_ATTEMPTS):
             yield from self._count_answers(cycles)
             missed = self.check_result["missed"]
@@ -131,7 +132,7 @@ class Transitions:
         )
 
     def _count_answers(self, cycles: int) -> Steps:
-        """Count the answers of some cycles, and keep the figures for the status."""
+        """Count the answers in some cycles, and keep the results for the status."""
         engine, machine, cycle = self._engine, self._machine, self._engine.cycle
         assert cycle is not None  # cycles run
         for _ in range(_SETTLE_CYCLES):
@@ -163,7 +164,7 @@ class Transitions:
             raise RefusedError(life.reason)
 
     def between_cycles(self, work: Callable[[], Any]) -> Steps:
-        """Run `work`, which may wait, while no cycles run; refused while drives are enabled."""
+        """Run `work`, which may wait, while no cycles run; rejected while drives are enabled."""
         if self._life.state is not LoopState.READY:
             raise RefusedError(f"cycles do not stop in state {self._life.state.label}")
         self._engine.stop_cycles()
@@ -179,7 +180,7 @@ class Transitions:
     def enable(self, program: str, arguments: Mapping[str, Any], right: int) -> Steps:
         """Enable the drives, hold, release the brakes, then run `program`.
 
-        They keep holding if the grant number `right` has expired by then.
+        If the grant number `right` has expired by then, the drives keep holding.
         """
         engine, life, machine = self._engine, self._life, self._machine
         engine.parts.programs[program].check(arguments)

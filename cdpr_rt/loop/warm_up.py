@@ -16,8 +16,8 @@ from cdpr_rt.motion.trajectory import TrapezoidalMove
 def warm_up(n: int, period_s: float) -> None:
     """Run the controllers of a `TrackProgram`, estimator and supervisor on n imaginary axes.
 
-    A kernel is compiled when it is first called, which may take seconds. The drives stop if the
-    master is silent for so long.
+    The first call of a kernel compiles it, which may take seconds. The drives would stop if the
+    master were silent for so long.
     """
     feedback, setpoint, torque, ones = AxisFeedback(n), Setpoint(n), np.zeros(n), np.ones(n)
     feedback.valid[:] = True
@@ -35,7 +35,7 @@ def warm_up(n: int, period_s: float) -> None:
 
 
 def warm_up_supervision(estimator: Estimator, supervisor: Supervisor, n: int) -> None:
-    """Compile the kernels of both, which are made for n axes; they are reset afterwards."""
+    """Compile the kernels of estimator and supervisor for n axes; reset both afterwards."""
     feedback = AxisFeedback(n)
     feedback.valid[:] = True
     estimator.update(feedback, TensionFeedback(n), motor_loss_Nm=np.zeros(n))

@@ -76,7 +76,7 @@ class Hanging(NamedTuple):
     measured_N: FloatArray
     """Readings of load cells at the winches, (n,)."""
     measured: BoolArray
-    """Whether they are valid, (n,)."""
+    """Whether these readings are valid, (n,)."""
     upward: FloatArray
     """Reading of an inclinometer, (4,)."""
 

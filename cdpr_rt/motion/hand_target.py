@@ -1,4 +1,4 @@
-"""A platform's target that follows a hand, within the workspace and the braking distance."""
+"""A platform's target that follows an input device, within workspace and braking distance."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ def to_rotation_vector(q: FloatArray, phi: FloatArray) -> None:
 
 @jit
 def multiply(p: FloatArray, q: FloatArray, inverted: bool, out: FloatArray) -> None:
-    """Write p q, or with `inverted` p q*, into `out` (4,), which is neither: first q, then p."""
+    """Write the product p q, or with `inverted` p q*, into `out` (4,), which must be another
+    array.
+    """
     w, x, y, z = q[0], q[1], q[2], q[3]
     if inverted:
         x, y, z = -x, -y, -z
@@ -47,9 +49,9 @@ def multiply(p: FloatArray, q: FloatArray, inverted: bool, out: FloatArray) -> N
 
 
 FREE, AT_EDGE, ON_STAND = 0, 1, 2
-"""Reasons why a target does not follow the hand."""
+"""Reasons why a target does not follow the input device."""
 LEAD_S = 0.3
-"""Longest time for which a platform slower than the hand may continue after the hand stops."""
+"""Longest time for which a slower platform may continue after the hand has stopped."""
 _BELOW_m = 1e-3
 
 
@@ -63,7 +65,7 @@ def _turn(
     scratch: FloatArray,
     goal: FloatArray,
 ) -> None:
-    """Write the target's rotation, turned like the hand about the room's axes `about`."""
+    """Write the target's rotation, rotated like the hand about the room's axes `about`."""
     delta, vector, here, there = scratch[0], scratch[1], scratch[2], scratch[3]
     multiply(pose[3:], last[3:], True, delta)
     to_rotation_vector(delta, here[:3])
@@ -110,7 +112,8 @@ def lead(
     scratch: FloatArray,
     goal: FloatArray,
 ) -> int:
-    """Write into `goal` the target (d,) moved with the hand since `last`; return what limits it.
+    """Write the target (d,), moved by the hand's motion since `last`, into `goal`; return its
+    limit.
 
     The coordinates (k,) move by `scale` times the hand's displacement, within the box from `low` to
     `high`; the rotation vector (d - k,) turns with it, within `angle`. `pose` and `last` are the
@@ -133,11 +136,11 @@ def lead(
     for i in range(last.size):
         last[i] = pose[i]
     for i in range(goal.size):
-        # a platform slower than the stream must not run on after the stream has stopped
+        # a platform that is slower than the stream must not continue after the stream has stopped
         reach = speed[i] * (0.5 * speed[i] / acceleration[i] + LEAD_S)
         goal[i] = min(max(goal[i], position[i] - reach), position[i] + reach)
     for i in range(k):
-        # do not pull it into the box if it is outside, for example on its stand
+        # do not pull the platform into the box if it is outside, for example on its stand
         least, most = min(low[i], target[i]), max(high[i], target[i])
         if goal[i] < least or goal[i] > most:
             edge = max(edge, AT_EDGE)

@@ -1,8 +1,8 @@
 """A stream of poses from an input device, played with the delay that its jitter requires.
 
-Samples may be late, repeated, out of order or lost. Each has its time of sending. The shortest
-transit of the last seconds gives the offset of the sender's clock. The longest gives the delay
-with which the next sample has arrived before it is due.
+Samples may be late, repeated, out of order or lost. Each sample contains its time of sending. The
+shortest transit time of the last seconds gives the offset of the sender's clock. The longest gives
+the playback delay after which the next sample has always arrived.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.core.shared_block import SAMPLES, SharedBlock
 from cdpr_rt.jit import bound, jit
 
-# Jitter buffer of the pose stream: it sorts samples and plays them with an adaptive delay.
-# Times are in seconds: `NOW` and `ARRIVED` by the cycles, the others by the sender's clock
-# since the first sample.
+# Jitter buffer of the pose stream: it sorts samples and plays them with an adaptive delay. Times
+# are in seconds: `NOW` and `ARRIVED` are counted in cycles, the others by the sender's clock since
+# the first sample.
 
 QUEUE_LENGTH = 64
 """Largest number of samples that wait to be played."""
@@ -164,7 +164,9 @@ def _continues(
 
 @jit
 def _update_transit(transit: float, scalars: FloatArray) -> None:
-    """Update the extreme transits. Late samples count too, or all later ones would be late."""
+    """Update the extreme transit times, also with late samples: otherwise all later ones would be
+    late.
+    """
     now = scalars[NOW]
     if now - scalars[_WINDOW_START] > _WINDOW_S:
         scalars[_WINDOW_START] = now
@@ -255,7 +257,7 @@ def receive(
     last: int,
     mover: int,
 ) -> None:
-    """Take the posted samples numbered from `first` up to `last`; `row` (COLUMNS,) is overwritten.
+    """Process the posted samples numbered `first` up to `last`; `row` (COLUMNS,) is overwritten.
 
     Samples of another grant of the right to move than `mover` are only counted.
     """
@@ -337,9 +339,9 @@ class StreamState(IntEnum):
     STOPPED = STOPPED
     """No sample yet, or none within the timeout: the motion must be braked."""
     HELD = HELD
-    """All samples have been played: the last pose is held."""
+    """All samples have been played, and the last pose is held."""
     FRESH = FRESH
-    """There is a later sample: the pose is interpolated."""
+    """A later sample exists, and the pose is interpolated."""
 
 
 _STATES = tuple(StreamState)
@@ -353,8 +355,8 @@ FASTEST_rad_s: Final = 30.0
 class PoseStream:
     """Plays the samples of the set-point stream, cycle by cycle; allocates nothing in `update`.
 
-    Only samples of the grant of the right to move under which the program runs are played. It uses
-    no clock: each call advances time by one period. The pose is interpolated between samples, never
+    It plays only samples that were sent under the program's grant of the right to move. It uses no
+    clock: each call advances time by one period. The pose is interpolated between samples, never
     extrapolated, and is continuous while `epoch` does not change. The stream restarts with a new
     sender, after a timeout, or after a jump of pose or clock.
     """
@@ -411,7 +413,7 @@ class PoseStream:
         self._receive(first, posted, int(self._mover[0]))
         if int(self._posted[0]) - first >= SAMPLES:
             self._counts[OVERRUN] += posted - first
-            self.reset()  # they may have been overwritten while they were read
+            self.reset()  # the samples may have been overwritten while they were read
             return self.state
         self._counts[OVERRUN] += max(0, first - self._next)
         self._next = posted
@@ -454,7 +456,7 @@ class PoseStream:
         return float(scalars[NOW] - earliest - scalars[PLAYED])
 
     def counts(self) -> dict[str, int]:
-        """Return how many samples were accepted, and how many rejected, by reason."""
+        """Return the numbers of samples accepted, and rejected by reason."""
         counts = self._counts
         return {
             "accepted": int(counts[ACCEPTED]),
@@ -478,10 +480,10 @@ _MOST: Final = 255
 
 
 def stream_buttons(clutch: bool, confirmed: int) -> int:
-    """Return the button bits of the clutch's state and the number of confirmations.
+    """Return the button bits for the clutch's state and the number of confirmations.
 
-    Bits 8 to 15 have the number: 0 before the first, then 1 to 255 and again from 1, so that
-    a lost packet loses no confirmation.
+    Bits 8 to 15 contain the number: 0 before the first confirmation, then 1 to 255 and again from
+    1. So a lost packet does not lose a confirmation.
     """
     count = 0 if confirmed <= 0 else (confirmed - 1) % _MOST + 1
     return (CLUTCH if clutch else 0) | count << _CONFIRMED_AT

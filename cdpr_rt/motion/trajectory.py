@@ -53,7 +53,9 @@ class Motion(Protocol):
         """Write the set-point at `time_s` after the start."""
 
     def brake(self, time_s: float) -> Motion:
-        """Return a motion whose second half stops from the state at `time_s`; skip the first."""
+        """Return a motion whose second half brakes from the state at `time_s`; callers skip the
+        first half.
+        """
 
 
 class TrapezoidalMove:
@@ -126,12 +128,12 @@ def approach(
     velocity: FloatArray,
     slope: FloatArray,
 ) -> bool:
-    """Advance one cycle towards `target`, to stop there; return whether all have stopped there.
+    """Advance one cycle towards `target`; return whether all axes have stopped there.
 
-    The trapezoidal profile of Tremblay (thesis), eq. (2.10) to (2.12), for each axis alone, with
-    the stopping distance of whole cycles: nothing overshoots, unless the target moves nearer
-    than that. All arrays are (n,): bounds `speed` and `acceleration` are positive, `position` and
-    `velocity` are updated in place, `slope` is the acceleration of this cycle.
+    Each axis follows the trapezoidal profile of Tremblay (thesis), eq. (2.10) to (2.12), with the
+    stopping distance of whole cycles. No axis overshoots, unless the target moves nearer than the
+    stopping distance. All arrays are (n,): bounds `speed` and `acceleration` are positive,
+    `position` and `velocity` are updated in place, `slope` is the acceleration of this cycle.
     """
     arrived = True
     for i in range(target.size):
@@ -198,10 +200,10 @@ def soft_deadband(
 ) -> float:
     """Write a goal between position and target: a dead band with soft edges and hysteresis.
 
-    goal = position + w·(target - position), with the two sigmoids of Tremblay (thesis), fig. 2.3:
-    w rises around the distance `threshold_m` while at rest, and around a tenth of it while moving.
-    Arrays are (n,); `scale` is how many metres each entry counts for. Returns w, the `weight` of
-    the next cycle.
+    goal = position + w·(target - position), with the two sigmoids of Tremblay (thesis), fig. 2.3: w
+    rises around the distance `threshold_m` while at rest, and around a tenth of it while moving.
+    Arrays are (n,); `scale` is the length in m for a unit of each entry. Returns w, the `weight`
+    for the next cycle.
     """
     size = 0.0
     for i in range(target.size):
@@ -218,7 +220,7 @@ def soft_deadband(
 def stopping_position(
     position: FloatArray, velocity: FloatArray, acceleration: FloatArray, rest: FloatArray
 ) -> None:
-    """Write the positions where full deceleration from now on ends; all are (n,).
+    """Write the positions at which full deceleration from now on ends; all are (n,).
 
     rest = position + velocity·|velocity| / (2·acceleration)
     """

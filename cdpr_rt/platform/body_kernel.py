@@ -69,8 +69,8 @@ def write_wrench(
 ) -> None:
     """Write the wrench (6,) of weight and inertia on a moving platform (Newton, Euler).
 
-    -(M a) - (m ω × (ω × r), r × that + ω × I ω) + (m g, r × m g), with M and `scratch` as
-    `write_mass_matrix` leaves them.
+    -(M a) - (f, r × f + ω × I ω) + (m g, r × m g) with f = m ω × (ω × r). M and `scratch` are those
+    that `write_mass_matrix` has written.
     """
     m, r, about = body[MASS], scratch[0], scratch[1:4]
     wx, wy, wz = twist[3], twist[4], twist[5]

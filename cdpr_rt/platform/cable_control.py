@@ -1,8 +1,8 @@
 """Control of a platform on n cables in d directions: its pose, and the torques that move it.
 
 Tremblay (thesis), sections 2.4 and 3.6, eqs. (3.64) to (3.79), but with one velocity loop of the
-platform instead of one of each motor. It commands a wrench that the tensions exert within their
-bounds, so that no cable is unwound and the motors never pull against each other.
+platform instead of one of each motor. It commands a wrench, which tensions within their bounds
+exert. So no cable is unwound, and the motors never pull against each other.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ from cdpr_rt.platform.own_controller import (
 )
 from cdpr_rt.platform.pull_fit import PullFit
 
-# Feasible places and ways of a platform: held by its cables, and free of contact.
+# Feasible positions and ways of a platform: its cables hold it, and it is free of contact.
 
 _MOST_LOOKS = 200  # in the contact check of a way, between two cycles
 
 
 class PlaceChecks:
-    """Checks places (d,), and ways from the set-point, between two cycles."""
+    """Checks positions (d,), and ways from the set-point, between two cycles."""
 
     position: FloatArray
     """The set-point, (d,), kept up to date by the control."""
@@ -78,7 +78,7 @@ class PlaceChecks:
         )
 
     def is_feasible(self, position: FloatArray) -> bool:
-        """Return whether the platform can be held, and accelerated, at a position (d,)."""
+        """Return whether the cables can hold and accelerate the platform at a position (d,)."""
         self._turn_to(position)
         return self.workspace.is_feasible(self._to)
 
@@ -91,19 +91,20 @@ class PlaceChecks:
         return self._interference.contact_at(self.position, position)
 
     def contact(self, pair: int) -> str:
-        """Return as text that a pair is in contact."""
+        """Return a text that says which pair is in contact."""
         return self._interference.within_clearance(pair)
 
     def infeasibility(self, position: FloatArray) -> str:
-        """Return why the platform cannot stand at a position (d,), "" if it can.
+        """Return the reason why the platform cannot be at a position (d,), or "".
 
-        Tensions must keep a reserve to their bounds there while it is accelerated in any direction.
+        Tensions must keep a reserve from their bounds there while the platform accelerates in any
+        direction.
         """
         self._turn_to(position)
         return self.workspace.infeasibility(self._to)
 
     def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
-        """Return what obstructs the straight way to a position (d,), "" for nothing.
+        """Return as text why the straight way to a position (d,) is infeasible, or "".
 
         The way begins at `start` (d,), or at the set-point.
         """
@@ -123,7 +124,7 @@ class PlaceChecks:
         )
 
 
-# A platform's set-point as programs write it, and as its control follows it.
+# A platform's set-point: as programs write it, and averaged for the control.
 
 
 class ShapedSetpoint:
@@ -194,10 +195,10 @@ def loop_settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArra
 
 
 def slides_on_stand(model: PlatformModel) -> FloatArray:
-    """Return how much longer cables become if the platform slides on its stand, (n, k).
+    """Return the lengthening (n, k) of each cable if the platform slides on its stand.
 
-    Along the horizontal directions, and in space about the vertical axis if that is controlled,
-    in m per m at the anchor points.
+    It is in m per m of motion at the anchor points, along the horizontal directions and, in space,
+    about the vertical axis if that is controlled.
     """
     horizontal = list(range(model.positions - 1))
     if model.positions == _SPATIAL:
@@ -214,7 +215,7 @@ def oscillation(
     velocity: FloatArray,
     period_s: float,
 ) -> Oscillation:
-    """Return the detector of oscillations of these `motors`, rows as above, caused by the loop.
+    """Return the detector of oscillations that the loop causes; `motors` are rows as above.
 
     `count_rad` (n,) is the resolution of their encoders, `velocity` (d,) the set-point's.
     """
@@ -240,7 +241,7 @@ def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float)
     return CellCheck([axis.name for axis in axes], rated_N, std_N, model.wrench_scale, period_s)
 
 
-_ON_STAND = 0.1  # of the integral part
+_ON_STAND = 0.1  # share of the integral part
 _NO_TILT = "the inclinometer gives no valid reading: the pose is less accurate"
 _WRONG_TILT = (
     "check mounting_rad, angles, scale_rad and zero_rad of the inclinometer, and centre_of_mass_m "
@@ -254,10 +255,10 @@ _SETTLING_STEPS, _LIFT_S, _COMES_AFTER_S = 60, 0.05, 0.1
 class CableControl(PlaceChecks):
     """A controller of a platform's set-point: position, velocity, acceleration, (d,) each.
 
-    As a `Controller` it writes the axes' set-points itself, so that others may continue from them.
-    The tensions that carry the platform follow from the method that its file names; the loop's
-    wrench is added. The gains are designed from the robot. If it `learns`, it learns friction and
-    cogging of motors that `compensation` does not know.
+    As a `Controller` it also writes the axes' set-points, so that other controllers can continue
+    from them. The method in the robot's file determines the tensions that carry the platform;
+    tensions for the loop's wrench are added. The gains are designed for the robot. If `learns` is
+    set, the control learns friction and cogging of motors without `compensation`.
     """
 
     def __init__(
@@ -286,13 +287,14 @@ class CableControl(PlaceChecks):
         self.setpoint = ShapedSetpoint(model.home, period_s)
         self.position, self.velocity, self.acceleration = self.setpoint.rows
         self.shaped: FloatArray = self.setpoint.shaped[0]
-        """The set-point's position that the control follows: shaped, some cycles later, (d,)."""
+        """Position (d,) that the control follows: the averaged set-point, some cycles late."""
         self.tension_N = np.array(self.low_N)
         self.outcome, self.share, self._limited = 0, 1.0, False
         self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
         self.cogging_Nm = np.zeros(n) if compensation is None else compensation.cogging_Nm
         self.residual_m, self.suspect, self._rate_inconsistency_m_s = np.inf, -1, 0.0
-        """Largest normalised residual of the lengths, m, and its cable, -1 if that is not known."""
+        """Largest normalised residual of the lengths, m, and its cable, -1 if the cable is not
+        known."""
         self.jump_m, self.jumped = 0.0, -1
         """The largest sudden change of a residual within some 0.2 s, and its cable."""
         self.estimated = np.array(model.home)
@@ -395,12 +397,14 @@ class CableControl(PlaceChecks):
             )  # fmt: skip
 
     def _friction(self) -> loop.WinchFriction:
-        """Return the compensated friction of the winches, which its owners keep up to date."""
+        """Return the compensated friction of the winches, as arrays that other parts keep up to
+        date.
+        """
         known, learning = self._compensation, self.learning
         n = self.model.kinematics.n
         nothing = np.zeros((n, 2))[
             :, 0
-        ]  # with gaps like the real ones: one compilation serves both
+        ]  # same memory layout as the real arrays, so that one compilation serves both
         return loop.WinchFriction(
             np.zeros(n) if known is None else known.friction_Nm,
             nothing if known is None else known.faded_in,
@@ -409,10 +413,10 @@ class CableControl(PlaceChecks):
         )
 
     def _bind_tensions(self) -> None:
-        """Bind the arrays of the kernels that turn the force into tensions and torques."""
+        """Bind the arrays of the kernels that convert the force to tensions and torques."""
         model, motors, scale = self.model, self._motors, self.model.wrench_scale
         n, d, method = model.kinematics.n, model.size, model.platform.tension_method
-        self._distribution: TensionSolver | None = None  # the split's own
+        self._distribution: TensionSolver | None = None  # None: `split` computes the tensions
         if method != "minimum-deviation":
             self._distribution = TensionSolver(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
@@ -442,7 +446,7 @@ class CableControl(PlaceChecks):
     def use_own(
         self, controller: Controller | None, distribution: TensionDistribution | None
     ) -> None:
-        """Let code of the user's choose the tensions off the stand from now on."""
+        """Let the user's code choose the tensions off the stand from now on."""
         if distribution is not None:
             self._own_distribution = OwnDistribution(
                 distribution, self.low_N, self.high_N, self.model.wrench_scale, self._period_s
@@ -477,7 +481,7 @@ class CableControl(PlaceChecks):
         self._own = OwnController(controller, state, target, last_N)
 
     def stand_in(self) -> None:
-        """Control the platform without code of the user's until the next `begin`."""
+        """Control the platform without the user's code until the next `begin`."""
         for own in (self._own, self._own_distribution):
             if own is not None:
                 own.stand_in()
@@ -505,16 +509,18 @@ class CableControl(PlaceChecks):
         return None if self.learning is None else self.learning.learnt_Nm
 
     def forget_motors(self) -> None:
-        """Forget what was learnt of the motors, for example after new origins of their encoders."""
+        """Discard what was learnt about the motors, for example after a change of encoder
+        origins.
+        """
         if self.learning is not None:
             self.learning.forget()
 
     def measure_tensions(
         self, tension_N: FloatArray, measured: BoolArray, upward: FloatArray
     ) -> None:
-        """Correct the cables' tensions by readings (n,) that others keep up to date, if valid.
+        """Correct the cable tensions by valid readings (n,), which other parts keep up to date.
 
-        Without a reading the control relies on the motor's torque constant and known losses.
+        Without a valid reading, the control relies on the motor's torque constant and known losses.
         `upward` (4,) is the reading of an inclinometer, for a platform that hangs freely.
         """
         self._hanging = self._hanging._replace(
@@ -528,7 +534,7 @@ class CableControl(PlaceChecks):
         )  # fmt: skip
 
     def notices(self) -> list[str]:
-        """Return which sensor is wrong and if the loop oscillates, until `clear_notices`."""
+        """Return notices about wrong sensors and an oscillating loop, until `clear_notices`."""
         told = (self._check.trouble, self._oscillation.trouble, self._tilt_trouble())
         return [text for text in told if text]
 
@@ -545,7 +551,7 @@ class CableControl(PlaceChecks):
         return ""
 
     def clear_notices(self) -> None:
-        """Forget the findings about load cells and loop."""
+        """Clear the notices about load cells and loop."""
         self._check.clear()
         self._oscillation.clear()
 
@@ -581,8 +587,8 @@ class CableControl(PlaceChecks):
     def _distributes_own(self, carried: bool) -> bool:
         """Return whether the user's distribution has written the tensions that carry the platform.
 
-        It is asked off the stand if the built-in tensions have `carried`, and if no controller of
-        the user's replaces them.
+        It is called when the platform is off the stand, the built-in tensions have `carried` it,
+        and no user-written controller replaces them.
         """
         own = self._own_distribution
         assert own is not None
@@ -593,14 +599,14 @@ class CableControl(PlaceChecks):
         return own.write(self._W, self._wrench, self._feedforward_N)
 
     def _was_exerted(self) -> bool:
-        """Return whether the cables exerted the last cycle's force completely."""
+        """Return whether the cables exerted the whole force of the last cycle."""
         plausible = self._rate_inconsistency_m_s <= loop.PLAUSIBLE_m_s
         if self._own is not None and self._own.in_use:
             return False
         return plausible and self.share >= 1.0 and self.outcome == OK and not self._limited
 
     def _compensate(self, feedback: AxisFeedback, setpoint: Setpoint) -> None:
-        """Write the torques against known, learnt and measured losses of the motors."""
+        """Write the torques that compensate known, learnt and measured losses of the motors."""
         learning, cells, torque = self.learning, self._cells, self.compensation_Nm
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.motor_loss_Nm)
@@ -613,15 +619,16 @@ class CableControl(PlaceChecks):
             torque += cells.torque_Nm
 
     def clear_compensation(self) -> None:
-        """Report zero compensation while a program drives the winches itself."""
+        """Set the reported compensation to zero while a program drives the winches directly."""
         self.compensation_Nm[:] = self.motor_loss_Nm[:] = self.cogging_Nm[:] = 0.0
 
     # -- pose of the platform
 
     def begin(self, feedback: AxisFeedback, tension_N: FloatArray | None = None) -> None:
-        """Assume the motors at rest, and the platform at the pose given by its cables.
+        """Assume that the motors are at rest, and the platform at the pose given by its cables.
 
-        The cables have `tension_N` (n,) at their winches, which may be far from planned tensions.
+        The cables have the tensions `tension_N` (n,) at their winches. These may be far from
+        planned tensions.
         """
         for own in (self._own, self._own_distribution):
             if own is not None:
@@ -641,15 +648,16 @@ class CableControl(PlaceChecks):
         self._swing[:] = 0.0
         motors[tracking.TENSION] = planned_N
         motors[tracking.SETTLED] = np.nan
-        self._rest(on_stand=False)  # the last set-point belonged to the former pose
+        self._rest(on_stand=False)  # the last set-point belonged to the previous pose
 
     def stand_still(self, *, on_stand: bool = False) -> None:
         """Put the set-point at rest at the platform's pose; the platform may be `on_stand`.
 
-        On the stand the integral part is bounded until the set-point moves: otherwise it would
-        press, and the first way off the stand would begin against that. If this is called in every
-        cycle, the set-point follows the platform slowly when tensions are not planned for the
-        platform's pose, since they would not hold it.
+        On the stand, the integral part is bounded until the set-point moves. Otherwise it would
+        press the platform against the stand, and the first motion off the stand would start against
+        this force. If this method is called in every cycle, and tensions are planned for the
+        set-point, which do not hold the platform at another pose, the set-point follows the
+        platform slowly.
         """
         again = self._on_stand and on_stand and not self.gains.follows_pose
         share = self._period_s / (self._period_s + _COMES_AFTER_S) if again else 1.0
@@ -669,11 +677,11 @@ class CableControl(PlaceChecks):
         self._write_coordinates()
 
     def suspects(self, jump: bool = False) -> list[int]:
-        """Return the cables whose length may be wrong, the likeliest first.
+        """Return the cables whose length may be wrong, the most likely first.
 
-        Those whose normalised residual |r_i| / sqrt(p_ii) is near the largest, where P = I - J J^+
-        and p_ii its diagonal; none if the lengths cannot contradict each other. With `jump` those
-        whose residual has changed suddenly by nearly the most.
+        These are the cables whose normalised residual |r_i| / sqrt(p_ii) is near the largest. p_ii
+        is the diagonal of P = I - J J^+. The list is empty if the lengths cannot contradict each
+        other. With `jump`, it has the cables with nearly the largest sudden change of the residual.
         """
         J = self._found[list(self.model.kinematics.directions)].T
         if not np.isfinite(J).all():
@@ -689,7 +697,7 @@ class CableControl(PlaceChecks):
         return sorted(near.tolist(), key=lambda i: -residual_m[i])
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
-        """Return lengths (n,) without tension at home, with `tension_N` (n,) at the winches."""
+        """Return the unstretched lengths (n,) at home for `tension_N` (n,) at the winches."""
         kinematics, motors = self.model.kinematics, np.array(self._motors)
         cables = np.zeros((CABLE_ROWS, kinematics.n))
         run_cables(kinematics.geometry, self._home.array, cables)
@@ -699,14 +707,14 @@ class CableControl(PlaceChecks):
         return np.asarray(kinematics.lengths(self._home) / motors[tracking.STRETCH])
 
     def _rises_N(self, cables: FloatArray) -> FloatArray:
-        """Return how far tensions at winches exceed those in the middle, (n,); reused."""
+        """Return the excess (n,) of tensions at the winches over those in the middle; reused."""
         write_tension_rises(self.model.kinematics.geometry, cables, self._rise_N)
         return self._rise_N
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
-        """Set the lengths of the cables without tension at the motors' angles, (n,).
+        """Set the unstretched lengths (n,) of the cables at the present motor angles.
 
-        Those that are nan keep their length, which this cycle has just set.
+        A cable whose entry is nan keeps its present length.
         """
         at_zero = length_m - self._motors[tracking.M_PER_RAD] * feedback.position_rad
         known = np.isfinite(at_zero)
@@ -720,7 +728,7 @@ class CableControl(PlaceChecks):
 
     @property
     def free_lengths_m(self) -> FloatArray:
-        """Lengths of the cables without tension by the motors' angles, (n,)."""
+        """Unstretched lengths of the cables by the motor angles, (n,)."""
         turned = self._motors[tracking.M_PER_RAD] * self._motors[tracking.THETA]
         return np.asarray(self._motors[tracking.AT_ZERO] + turned)
 
@@ -732,24 +740,26 @@ class CableControl(PlaceChecks):
 
     @property
     def swing_rad(self) -> float:
-        """Amplitude of rotation of a platform that no cable keeps from turning; else 0."""
+        """Amplitude of the swing of a platform that turns freely; 0 for others."""
         return float(self._swing[tracking.AMPLITUDE])
 
     @property
     def swing_m(self) -> float:
-        """Amplitude of an anchor point of such a platform; else 0."""
+        """Amplitude of that swing at an anchor point; 0 for other platforms."""
         return float(self._swing[tracking.AMPLITUDE_m])
 
     # -- feasibility
 
     def tension_infeasibility(self) -> str:
-        """Return why the last cycle's tensions are not feasible, "" if they are."""
+        """Return the reason why the last cycle's tensions are infeasible, or ""."""
         if not self.outcome:
             return ""
         return self._held.infeasibility(self._wanted) or self._infeasibility_in_motion()
 
     def _infeasibility_in_motion(self) -> str:
-        """Return which cable limits the wanted motion if the platform could stand still here."""
+        """Return the cable that limits the wanted motion, if the platform could stand still
+        here.
+        """
         W, t, low_N, high_N = self._W, self._feedforward_N, self.low_N, self.high_N
         needed_N = t - np.linalg.pinv(W) @ (W @ t + self._wrench)
         margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())

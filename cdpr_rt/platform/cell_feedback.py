@@ -1,13 +1,13 @@
 """Feedback of measured tensions: corrections of the motors' torques.
 
-A cable's tension t is the commanded one, a, minus the loss d by friction, cogging and errors of
-torque constants, plus a correction b of this feedback: t = a - d + b. With ḃ = k (a - t), t becomes
-a - d s/(s + k), whatever the loop does with a. So neither disturbs the other. a is low-passed like
-the reading.
+A cable's tension is t = a - d + b: the commanded tension a, minus the loss d due to friction,
+cogging and errors of torque constants, plus the correction b of this feedback. With ḃ = k (a - t),
+t becomes a - d s/(s + k) for every a that the loop commands. So feedback and loop do not disturb
+each other. a is low-passed like the reading.
 
-A cell may be wrong without being silent. So b may only use what the loop's force leaves of the
-reserve between planned tensions and their bounds: whatever a cell reads, a + b is within the
-bounds. The learnt torques may be wrong too: together with them, b stays within their maximum.
+A cell may send wrong readings. So b may only use the part of the reserve between planned tensions
+and their bounds that the loop's force leaves: a + b is within the bounds for every reading. The
+learnt torques may be wrong too, so b together with them stays within a maximum.
 """
 
 from __future__ import annotations
@@ -22,30 +22,31 @@ from cdpr_rt.jit import bound, jit
 from cdpr_rt.model.tension_split import FAST
 from cdpr_rt.platform.motor_learning import MOST_RESERVE_SHARE
 
-# Comparison of load cells with motors and with the platform's balance of forces. At a tension t
-# a cell shows z = t + e, and its motor is commanded τ = t + m. If cell i alone is off, by a,
-# then of the differences and of the balance of forces z - τ = a 1_i - m, W z + w = a W_i + ε.
-# The usual m, friction and cogging left over and an error of the torque constant, and the usual
-# ε, errors of mass and geometry and a payload, are known as standard deviations. So a is the
-# weighted mean of all evidence, and known to σ_a. If no motor contradicts the cells, the cause
-# is an external force, such as a hand that pulls, and no cell. Both sides are low-passed, so
-# motion has no effect.
+# Comparison of load cells with motors and with the platform's balance of forces. At a tension t a
+# cell shows z = t + e, and its motor is commanded τ = t + m. If only cell i is wrong, by a, then
+# the differences are z - τ = a 1_i - m, and the balance of forces is W z + w = a W_i + ε. m is due
+# to uncompensated friction and cogging and errors of the torque constant, ε to errors of mass and
+# geometry and a payload. Their usual standard deviations are known. So a is the weighted mean of
+# all data, with the standard deviation σ_a. If no motor contradicts the cells, the cause is an
+# external force, such as a hand that pulls, and no cell. Both sides are low-passed, so motion has
+# no effect.
 
 MOTOR_SHARE, CONSTANT_SHARE = 0.03, 0.05
-"""σ of m: of the motor's rated tension, and of the tension."""
+"""σ of m, as shares of the motor's rated tension and of the tension."""
 BALANCE_SHARE, ACROSS_SHARE, WEIGHT_SHARE = 0.02, 0.1, 0.5
-"""σ of ε, in N: of all tensions' norm; of the weight, across it, and along it and for moments."""
+"""σ of ε, in N: as a share of the norm of all tensions; as a share of the weight, horizontally; the
+same vertically and for moments."""
 SIGMAS = 4.0
-"""Number of σ_a from which on a cell is reported."""
+"""A cell is reported if its error exceeds this number of σ_a."""
 _OWN_SHARE = 0.5
-"""Share of a by which a cell must differ from its own motor."""
+"""Share of the error a by which the cell must differ from its own motor."""
 _LOWPASS_S, _SETTLING_S = 1.5, 4.0
 
 
 def balance_std_N(weight_N: float, up: int, scale: FloatArray) -> FloatArray:
     """Return the part of σ of ε due to mass and payload, (d,); direction `up` is vertical.
 
-    `scale` (d,) is how far a unit of each direction counts; positions come first.
+    `scale` (d,) is the length that corresponds to a unit of each direction; positions come first.
     """
     std_N = WEIGHT_SHARE * weight_N * scale
     std_N[:up] = ACROSS_SHARE * weight_N
@@ -71,10 +72,10 @@ def compare(
 ) -> int:
     """Process one cycle; return the cell with the largest error, -1 if none can be identified.
 
-    A cell at a winch shows `rise` (n,) more than z, which like t is in the middle of its cable.
-    `asked` (n,) are the commanded tensions, as late as readings are, `correction` (n,) what is
-    added to them. Of `found` (2, n), written, are a and SIGMAS σ_a of each cell; `difference` (n,)
-    and `balance` (d,) are z - τ and W z + w, low-passed.
+    A cell at a winch shows `rise` (n,) more than z, because z and t apply to the middle of the
+    cable. `asked` (n,) are the commanded tensions, delayed like the readings. `correction` (n,) is
+    added to them. The rows of `found` (2, n) are written: a and SIGMAS σ_a of each cell.
+    `difference` (n,) and `balance` (d,) are z - τ and W z + w, low-passed.
     """
     d, n = W.shape
     share, square, whole = period_s / (_LOWPASS_S + period_s), 0.0, True
@@ -108,7 +109,7 @@ def compare(
 
 
 class CellCheck:
-    """Reports a load cell that is off; see above."""
+    """Reports a load cell with wrong readings; see above."""
 
     def __init__(
         self,
@@ -147,7 +148,7 @@ class CellCheck:
         )  # fmt: skip
 
     def restart(self) -> None:
-        """Begin again, for example after cycles without control; the finding stays."""
+        """Begin again, for example after cycles without control; the result stays."""
         self._difference[:] = self._balance[:] = 0.0
         self._settling = self._cycles
 
@@ -163,7 +164,7 @@ class CellCheck:
 
     @property
     def trouble(self) -> str:
-        """Which cell is off and by how much at most, "" for none; until `clear`."""
+        """Text on the wrong cell and its largest error, "" for none; until `clear`."""
         if self._named < 0:
             return ""
         return (
@@ -174,12 +175,12 @@ class CellCheck:
         )
 
     def clear(self) -> None:
-        """Forget which cell was off."""
+        """Clear the result."""
         self._named, self._off_N = -1, 0.0
 
 
 RATE_1_s = 2.0
-"""k: much slower than the filters of amplifiers and the age of readings, some 0.1 s together."""
+"""k, much slower than amplifier filters and the age of readings, together about 0.1 s."""
 LAG_S, FALL_BACK_S = 0.07, 1.0
 SHARE, TOGETHER_SHARE = 1.0 - FAST, 2.0 * MOST_RESERVE_SHARE
 """Shares of the reserve that limit the correction, and the correction plus the learnt part."""
@@ -202,11 +203,10 @@ def follow(
 ) -> bool:
     """Update corrections (n,), N, by a cycle, and write their torques (n,), Nm.
 
-    They stay within a share of the reserve, and return to 0 while there is no reading; the torques
-    together with those that were `learnt` (n,) stay within a larger one. `applied` (n,), N,
-    written, is the remaining part of the corrections. Cells sit at the winches, where tensions
-    exceed the commanded ones, which are those in the middle of the cables, by `rise` (n,). Returns
-    whether there is any reading.
+    Corrections stay within a share of the reserve, and return to 0 while there is no reading.
+    Corrections plus `learnt` torques (n,) stay within a larger share. The corrections that remain
+    are written to `applied` (n,), N. Cells are at the winches; tensions there exceed the commanded
+    ones, in the middle of the cables, by `rise` (n,). Returns whether there is any reading.
     """
     read, most_N = False, SHARE * reserve_N
     for i in range(asked.size):
@@ -240,10 +240,10 @@ class CellFeedback:
         learnt_Nm: FloatArray,
         rise_N: FloatArray,
     ) -> None:
-        """Take the arrays of readings (n,), which are written elsewhere, and of their validity.
+        """Take the arrays of readings (n,) and of their validity, which other parts write.
 
-        `reserve_N` is the reserve of planned tensions to their bounds. W (d, n) and the `wrench`
-        (d,) besides the cables' are those of the cycle, with which `check` compares the readings;
+        `reserve_N` is the reserve of planned tensions to their bounds. W (d, n) and `wrench` (d,),
+        without that of the cables, belong to the cycle; `check` compares the readings with them.
         `learnt_Nm` (n,) is added for learnt losses of the motors, `rise_N` (n,) is the excess of
         tensions at the winches over those in the middle of their cables.
         """

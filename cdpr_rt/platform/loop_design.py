@@ -1,15 +1,15 @@
 """Design of a platform's loop from its rotors, cables, delays and mass, and its margins.
 
 The plant is that of `loop_plant`: x = -G τ, with the rotors' x as paid-out cable. From x the loop
-computes, with a delay, the motors' pull τ = C(s) x. The largest singular value of the sensitivity
-(1 + C G)^-1 shows how far the eigenvalues of the return difference are from 0. Its inverse, the
+computes the motors' pull τ = C(s) x, with a delay. The largest singular value of the sensitivity (1
++ C G)^-1 shows how far the eigenvalues of the return difference are from 0. Its inverse, the
 modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin of at least 2 asin(μ/2)
 (Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
 
-Tensions that are planned for the platform's pose follow it, with a delay: they remove the geometric
-stiffness K_G that they cause. With L(s) the part of x that passes, G' = (1 - G L K_G)^-1 G. If the
-cables' stiffness is not much more than that, tensions are planned for the set-point instead, and
-K_G acts on the platform when something turns it away.
+Tensions that are planned for the platform's pose follow it with a delay, and so remove the
+geometric stiffness K_G that they cause. If L(s) is the low-pass of x, the plant becomes G' = (1 - G
+L K_G)^-1 G. If the cables are not much stiffer than K_G, tensions are planned for the set-point
+instead. K_G then acts on the platform whenever it leaves the set-point.
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ def keeps_margin(
 ) -> bool:
     """Return whether no singular value of any return difference S = 1 + C G is below `least`.
 
-    `plants` (m, k, f, d, d) are G at m poses with k stiffnesses, and C is diagonal: `of_speed`
-    (f,) times `damping` (m, d) and `of_place` (f,) times `stiffness` (m, d). None is below if
-    S^H S - least² 1 has a Cholesky factor. A quicker test also proves it: each |s_aa| exceeds half
-    the sum of the other amounts in its row and its column by `least` (C. R. Johnson, A
-    Gersgorin-type lower bound for the smallest singular value, 1989). `scratch` (2, d, d) is
+    `plants` (m, k, f, d, d) are G at m poses with k stiffnesses, and C is diagonal: `of_speed` (f,)
+    times `damping` (m, d) and `of_place` (f,) times `stiffness` (m, d). No singular value is below
+    `least` if S^H S - least² 1 has a Cholesky factor. A quicker sufficient test: each |s_aa|
+    exceeds, by `least`, half the sum of the other magnitudes in its row and column (C. R. Johnson,
+    A Gersgorin-type lower bound for the smallest singular value, 1989). `scratch` (2, d, d) is
     overwritten.
     """
     m, k, f, d, _ = plants.shape
@@ -91,7 +91,8 @@ def keeps_margin(
 def _is_dominated(S: ComplexArray, least: float) -> bool:
     """Return whether the diagonal of `S` (d, d) bounds its singular values by `least` from below.
 
-    |re| + |im| replaces the other amounts: it needs no roots and is never less.
+    Magnitudes off the diagonal are replaced by |re| + |im|, which needs no roots and is never
+    smaller.
     """
     d = S.shape[0]
     for a in range(d):
@@ -108,7 +109,7 @@ def _is_dominated(S: ComplexArray, least: float) -> bool:
 
 @jit
 def _is_positive_definite(S: ComplexArray, H: ComplexArray, square: float) -> bool:
-    """Return whether S^H S - square 1 is positive definite; its factor goes into `H`."""
+    """Return whether S^H S - square 1 is positive definite; write its factor into `H`."""
     d = S.shape[0]
     for b in range(d):
         for a in range(b, d):
@@ -127,21 +128,23 @@ def _is_positive_definite(S: ComplexArray, H: ComplexArray, square: float) -> bo
     return True
 
 
-# One cycle of a robot and its platform's loop, linear around a pose: its eigenvalues. They
-# supplement the margins of `loop_design`, which are taken in frequency. Rotors and platform on
-# their cables, as in `loop_plant` along the modes, m_r x'' = T - τ, λ q'' = -P^T T - K_G q,
-# T = k (P q - x) + b k (P q' - x'), are discretised exactly for torques that are held for a cycle
-# and act a cycle and the drive's delay after the angles that they come from. The control of a
-# cycle is that of its kernels: observer and low-pass of the velocity, pose by x and its
-# stretch, D' and K', the integral part at its rate in motion, damping of cables against each
-# other, and tensions that follow the pose if they do. Saturation, deadband, friction and bounds
-# of tensions are not included. An eigenvalue z of the matrix of one cycle of T swings with
-# ln(z)/T = (-ζ ± i sqrt(1 - ζ²)) ω: it dies down if |z| < 1.
+# Eigenvalues of one cycle of a robot and its platform's loop, linearised at a pose. They supplement
+# the margins in the frequency domain. Rotors and platform on their cables, as in `loop_plant` along
+# the modes, m_r x'' = T - τ, λ q'' = -P^T T - K_G q, T = k (P q - x) + b k (P q' - x'), are
+# discretised exactly for torques that are constant over a cycle and act one cycle plus the drive's
+# delay after the angles from which they are computed. The control of a cycle is that of its
+# kernels: observer and low-pass of the velocity, pose by x and its stretch, D' and K', the integral
+# part at its rate in motion, damping of cables against each other, and tensions that follow the
+# pose if they do. Saturation, deadband, friction and bounds of tensions are not included. An
+# eigenvalue z of the matrix of one cycle T oscillates with ln(z)/T = (-ζ ± i sqrt(1 - ζ²)) ω. It
+# decays if |z| < 1.
 
 _SQUARINGS, _GROWN = 18, 1e12
-"""Squarings of a cycle, to its power of 2^18; norm of a power that counts as growing."""
+"""Number of squarings of a cycle's matrix, up to the power 2^18; norm of a power above which modes
+grow."""
 _TERMS, _MOST_NORM = 13, 0.5
-"""Terms of the exponential's series, and largest norm to sum it for: exact to 1e-15."""
+"""Number of terms of the exponential series, and largest norm for its sum, which is exact to
+1e-15."""
 
 
 class Mode(NamedTuple):
@@ -149,11 +152,11 @@ class Mode(NamedTuple):
 
     frequency_Hz: float
     damping_ratio: float
-    """ζ, negative if it grows."""
+    """ζ, negative if the mode grows."""
 
     @property
     def dies_down_s(self) -> float:
-        """Time after which 2 % are left of it."""
+        """Time after which 2 % of the amplitude are left."""
         rate = self.damping_ratio * math.tau * self.frequency_Hz
         return math.log(50.0) * math.sqrt(1.0 - self.damping_ratio**2) / rate
 
@@ -168,10 +171,10 @@ def least_damped(cycle: FloatArray, period_s: float) -> Mode:
 
 
 def dies_down(cycle: FloatArray) -> bool:
-    """Return whether all modes of cycles (..., size, size) die down: |z| < 1 if a power's norm is.
+    """Return whether all modes of cycles (..., size, size) decay.
 
-    By squaring, in a fifth of the time of the eigenvalues. A mode that takes more than 2^18 cycles
-    counts as growing.
+    Repeated squaring shows it: |z| < 1 if the norm of a power is below 1. This takes a fifth of the
+    time of the eigenvalues. A mode that needs more than 2^18 cycles counts as growing.
     """
     power = cycle
     for _ in range(_SQUARINGS):
@@ -198,8 +201,9 @@ def cycle_matrix(
 ) -> FloatArray:
     """Return the matrix of one cycle (size, size) with this share of the cables' stiffness k (n,).
 
-    The stiffness and K_G (d, d) belong to some tensions; rotors' masses are (n,). D' and K' (d,)
-    are the loop's `damping` and `stiffness` along the modes; cables' own damping is a ratio to k.
+    The stiffness k and K_G (d, d) belong to certain tensions. Rotor masses are (n,). D' and K' (d,)
+    are the loop's `damping` and `stiffness` along the modes. The cables' own damping is a ratio to
+    k.
     """
     P = plant.pulls
     n, d = P.shape
@@ -242,7 +246,8 @@ def _motion(
     period_s: float,
     cable_damping_s: float,
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Return the transitions of plant and torque in a cycle's two parts (size, size + n).
+    """Return the transition matrices of plant and torque in the two parts of a cycle (size, size +
+    n).
 
     In the first part the torque of `held` cycles ago still acts, in the second the next one;
     `held` is also returned.
@@ -267,7 +272,8 @@ def _motion(
 def _exponential(F: FloatArray) -> FloatArray:
     """Return exp(F) (size, size): the series of exp(F/2^k), squared k times.
 
-    SciPy's takes seven times as long, 2 s more for each start of a robot with eight cables.
+    SciPy's function takes seven times as long, which adds 2 s to each start of a robot with eight
+    cables.
     """
     norm = float(np.abs(F).sum(axis=0).max())
     squarings = max(0, math.ceil(math.log2(max(norm, _MOST_NORM) / _MOST_NORM)))
@@ -284,7 +290,8 @@ def _exponential(F: FloatArray) -> FloatArray:
 LEAST_MARGIN = 0.45
 """Modulus margin that the design keeps, with all stiffness in STIFFNESS_SHARES."""
 FOLLOWED_MARGIN = 0.4
-"""Margin of a loop designed without tensions when it is checked with those that follow the pose."""
+"""Margin of a loop designed without tensions, when it is checked with tensions that follow the
+pose."""
 STIFFNESS_SHARES = (0.7, 1.0, 1.3)
 _SMOOTHERS_Hz = ((0.0, 25.0), (0.55, 25.0), (0.55, 12.0), (0.8, 12.0), (0.8, 8.0), (0.9, 12.0))
 """Shares of smooth velocity that are tried, each with the frequency of its low-pass."""
@@ -292,30 +299,33 @@ _ROTOR_SHARES = (1.6, 0.8, 0.4)
 _LOOSE_SHARE = 0.075
 _INTEGRAL_RATE_1_s = 5.0
 _INTEGRAL_SHARES = (0.3, 0.15)
-"""Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
+"""Rates of the integral part that are tried, as shares of 2 ζ ω of the slowest mode."""
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
 _TURNED_AWAY_SHARE = 0.5
-"""Largest share of the loop's stiffness that tensions may remove in the slowest loop tried."""
+"""Largest share of the loop's stiffness that tensions may remove, in the slowest loop tried."""
 _STEP, _REFINEMENTS = 1.3, 3
 _CALMING_STEP, _LEAST_SHARE = 0.93, 0.2
-"""Factor by which a loop's damping is reduced until its modes die down, and its least share."""
+"""Factor by which a loop's damping is repeatedly reduced until its modes decay, and its least
+share."""
 _LOW_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
 _LOWEST_Hz, _BELOW = 0.02, 12
-"""Below the slowest modes: tensions that follow a softer platform may make it drift away."""
+"""Least frequency of the slowest modes: tensions that follow a softer platform may make it drift
+away."""
 
 
 class UnstableError(GeometryError):
-    """A robot that no loop can hold."""
+    """No loop can hold the robot's platform."""
 
 
 class SwingsError(UnstableError):
-    """A robot with a mode that each loop makes oscillate."""
+    """Every loop makes a mode of the robot oscillate."""
 
 
 def design_poses(model: PlatformModel) -> FloatArray:
     """Return the set-points (m, d) at which a loop is designed and checked.
 
-    Home, the middle, the corners of the box, and the middle turned about each axis to both sides.
+    They are home, the middle and the corners of the box of targets, and the middle turned about
+    each axis in both directions.
     """
     platform = model.platform
     k, d = model.positions, model.size
@@ -345,10 +355,10 @@ class LoopModel:
     ) -> None:
         """Take rotors' masses (n,) at the cables, EA (n,), and set-points (m, d).
 
-        Cables' damping over their stiffness is used if it is less than CABLE_DAMPING_s, with which
-        margins are computed.
+        The given ratio of cable damping to stiffness is used if it is less than CABLE_DAMPING_s;
+        margins are computed with CABLE_DAMPING_s.
 
-        Raises GeometryError if the cables do not hold the platform at one of them.
+        Raises GeometryError if the cables cannot hold the platform at one of the set-points.
         """
         self.period_s, self.rotor_kg = period_s, float(rotors_kg.mean())
         self.cable_damping_s = cable_damping_s
@@ -425,7 +435,7 @@ class LoopModel:
         return np.array(cycles)
 
     def dies_down(self, gains: LoopGains, cable_damping_s: float) -> bool:
-        """Return whether all modes die down at all poses; starts with the last pose that failed."""
+        """Return whether all modes decay at all poses; starts with the last pose that failed."""
         for i in sorted(range(len(self.poses)), key=lambda i: i != self._hardest):
             if not dies_down(self._cycles(gains, i, cable_damping_s)):
                 self._hardest, self._swings = i, gains
@@ -467,10 +477,10 @@ class LoopModel:
         return keeps_margin(plants, *factors, damping, stiffness, least, scratch)
 
     def design(self) -> LoopGains:
-        """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
+        """Return the loop that overcomes friction soonest among those that keep LEAST_MARGIN.
 
-        If the cables are known to damp less than assumed, weaker loops are searched whose modes
-        still die down. Raises UnstableError if none holds the platform, SwingsError if modes would
+        If the cables are known to damp less than assumed, weaker loops whose modes still decay are
+        searched. Raises UnstableError if no loop holds the platform, and SwingsError if modes would
         grow.
         """
         best, loops = self._soonest()
@@ -485,21 +495,23 @@ class LoopModel:
         """Return the best loop for cables that damp as assumed, and all candidates.
 
         The candidates keep the margin at all poses, with all stiffness. Dry friction in the
-        winches, about the same in each, keeps a platform from its target, and the integral part
-        overcomes it. So that part ranks them: in N/(m s) of cable, geometric mean over the modes.
+        winches, about equal in each, keeps a platform from its target, and the integral part
+        overcomes it. So candidates are ranked by the gain of the integral part, in N/(m s) of
+        cable, as geometric mean over the modes.
 
         The loop is designed for elastic cables, and checked with tensions that follow the pose,
-        from none to the greatest that may be planned. If that takes too much of its margin, it is
+        from zero to the greatest that may be planned. If the margin then is too small, the loop is
         designed again, for tensions of the set-point. If no loop is stiff enough for tensions that
-        turn the platform away, it is designed for some that follow. All modes must die down.
+        turn the platform away, it is designed for tensions that follow the pose. All modes must
+        decay.
         """
         turning, late_s = self._geometric_N_m, latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         loops = self._loops(self._elastic, np.zeros_like(turning), follows_pose=True)
         keeps = bool(loops) and self._keeps(loops[0], self._followed, FOLLOWED_MARGIN)
         if keeps and self.dies_down(loops[0], CABLE_DAMPING_s):
             return loops[0], loops
-        self._swings = None  # the modes of that loop say nothing about the next ones
-        # tensions that follow late reduce the damping, by the delay times their stiffness
+        self._swings = None  # the modes of that loop do not apply to the next loops
+        # tensions that follow with a delay reduce the damping, by the delay times their stiffness
         for plants, turned, follows in (
             (self._planned, turning, False),
             (self._followed, late_s * turning, True),
@@ -529,7 +541,9 @@ class LoopModel:
     def _loops(
         self, plants: ComplexArray, turning: FloatArray, *, follows_pose: bool
     ) -> list[LoopGains]:
-        """Return the quickest loop of each kind that holds the platform, the soonest first."""
+        """Return the quickest loop of each kind that holds the platform, ranked as in
+        `_soonest`.
+        """
         found = []
         tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
         for (smooth, smoother_Hz), share, integral in tried:
@@ -540,9 +554,9 @@ class LoopModel:
         return sorted(found, key=self._integral_N_m_s, reverse=True)
 
     def _calmed(self, loops: list[LoopGains], cable_damping_s: float) -> LoopGains | None:
-        """Return the soonest of the sorted loops, weakened until all modes die down.
+        """Return the first of the sorted loops whose modes all decay, weakened if necessary.
 
-        None if no loop's modes do.
+        Returns None if there is no such loop.
         """
         best, soonest = None, 0.0
         for gains in loops:
@@ -567,7 +581,7 @@ class LoopModel:
     def _slow(
         self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
     ) -> LoopGains:
-        """Return the slowest loop with this share of smooth velocity, and of a rotor's damping."""
+        """Return the slowest loop with these shares of smooth velocity and of a rotor's damping."""
         late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         most = self._lightest_kg / late_s / (1.0 - smooth)
         loose = _LOOSE_SHARE * most
@@ -581,9 +595,10 @@ class LoopModel:
     ) -> LoopGains | None:
         """Return the slowest loop from these gains on that holds the platform.
 
-        If tensions turn the platform away, like those of crossed cables, by `turning`
-        (..., d, d), in N/m (N s/m if they follow its pose), the loop must be stronger than that
-        and keep LEAST_MARGIN. None if there is no such loop.
+        Tensions, such as those of crossed cables, may turn the platform away with the negative
+        stiffness `turning` (..., d, d), N/m (a damping in N s/m if they follow its pose). The loop
+        must then be stronger than `turning` and keep LEAST_MARGIN. Returns None if there is no such
+        loop.
         """
         if self._holds(gains, turning):
             return gains
@@ -602,8 +617,8 @@ class LoopModel:
     def _quickest(self, gains: LoopGains, plants: ComplexArray) -> LoopGains:
         """Return the quickest loop from these gains on.
 
-        The search goes from slow to quick: the slow loop is stable, and a loop stays stable if the
-        margin is kept all the way from there.
+        The search goes from slow to quick loops. The slow loop is stable, and all loops that keep
+        the margin continuously from there are also stable.
         """
         best, step, refinements = gains, _STEP, 0
         while best.bandwidth_rad_s < _FASTEST_rad_s and refinements < _REFINEMENTS:
@@ -632,11 +647,12 @@ class LoopModel:
 
 @dataclass(frozen=True)
 class _Robot:
-    """Input of a loop's design; the loop of a robot is designed once."""
+    """Input of a loop's design; equal inputs are designed only once."""
 
     platform: Platform
     bounds_N: tuple[tuple[float, ...], ...]
-    """Bounds of the tensions, which turn the platform: least, greatest, reserve to them."""
+    """Least and greatest tensions and the reserve to both, which determine the geometric
+    stiffness."""
     rotors_kg: tuple[float, ...]
     stiffness_N: tuple[float, ...]
     cable_damping_s: float
@@ -659,7 +675,7 @@ class DesignedLoop:
 
     @property
     def margins(self) -> list[LoopMargins]:
-        """Its margins at these poses."""
+        """Margins of the loop at these poses."""
         return self._judged.margins
 
     @property
@@ -669,9 +685,9 @@ class DesignedLoop:
 
     @property
     def growing_modes(self) -> tuple[Mode, ...]:
-        """These modes if cables damped by LITTLE_DAMPING_s.
+        """The modes with cables that damp only by LITTLE_DAMPING_s.
 
-        Empty if no mode grows then, or if the cables damp no more than that anyway.
+        Empty if no mode grows in that case, or if the cables damp no more than that anyway.
         """
         return self._judged.growing
 
@@ -682,7 +698,9 @@ class DesignedLoop:
 
     @cached_property
     def _judged(self) -> _Judged:
-        """Properties for reports only. Its `LoopModel` is freed again, as it takes megabytes."""
+        """Properties for reports only. The `LoopModel` is freed again, because it takes
+        megabytes.
+        """
         loop, gains, damping_s = _loop_model(self._robot), self.gains, self._robot.cable_damping_s
         calm = damping_s <= LITTLE_DAMPING_s or loop.dies_down(gains, LITTLE_DAMPING_s)
         growing = () if calm else loop.least_damped(gains, LITTLE_DAMPING_s)
@@ -692,8 +710,7 @@ class DesignedLoop:
 def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
     """Return the loop of a robot with these axes, one for each of the n cables.
 
-    Raises GeometryError if the cables do not hold the platform, UnstableError if no loop
-    does.
+    Raises GeometryError if the cables cannot hold the platform, and UnstableError if no loop can.
     """
     return _designed(_robot(model, axes, period_s))
 

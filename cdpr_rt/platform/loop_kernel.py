@@ -1,15 +1,15 @@
 """Kernels of one cycle of a platform's control: set-point shaping, force, torques.
 
 In addition to the known wrench, the cables exert F = D (ė + M^-1 D e/(4 ζ²)) and an integral part.
-This is a loop of damping ratio ζ in each mode of the platform. Its bandwidth is ω, or less if its
-damping D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1 would require more than c of the cables. The
-proportional part is saturated, the damping is not: far from its target the platform returns at the
-speed at which both are equal. The integral part has a deadband for errors that friction can
-explain, so that the platform stands still at its target. A sigmoid leads into the deadband, with
-hysteresis as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error. What the integral
-part gains at rest acts against friction of unknown sign. In motion friction is compensated, so when
-motion begins, this gain is reduced by at most the friction. Otherwise the platform would leap in
-directions in which the cables' friction is large relative to the loop's stiffness.
+This is a loop of damping ratio ζ in each mode of the platform. Its bandwidth is ω, or less where
+the damping would exceed c at the cables: D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1. The proportional
+part is saturated, the damping is not. So far from its target the platform returns at the speed at
+which both parts are equal. The integral part has a deadband for errors that friction can explain,
+so that the platform stands still at its target. A sigmoid leads into the deadband, with hysteresis
+as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error. At rest, the integral part
+grows against friction of unknown sign. In motion, friction is compensated, so this growth is
+removed when motion begins, up to the friction. Otherwise the platform would jump in directions in
+which friction is large relative to the loop's stiffness.
 
 Arrays besides those of the kinematics' kernels: a loop's row of SETTINGS, and its STATE: the
 integral part (d,), N and Nm; then the share of its rate that the deadband leaves, 0 to 1; the twist
@@ -28,7 +28,7 @@ from cdpr_rt.model.cable_kernel import hang, write_tension_rises
 from cdpr_rt.platform.body_kernel import write_mass_matrix, write_wrench
 
 STRETCH_SHARE = 0.2
-"""Share by which the tensions assumed for the cables' stretch follow the planned ones."""
+"""Share by which the tensions used for the cables' stretch follow the planned ones, per cycle."""
 PLAUSIBLE_m_s = 0.15
 """Largest disagreement of the cables' rates in motion."""
 _LOWPASS_S = 0.02
@@ -51,8 +51,8 @@ def shape(past: FloatArray, place: int, wanted: FloatArray, shaped: FloatArray) 
 
     `past` (k, 3, d) are the last k positions, velocities and accelerations, `wanted` (3, d) the
     present ones, `shaped` (3, d) their mean; `place` is the index of the oldest. Oscillations with
-    a period of k cycles are not excited; bounds, straight ways and the place of rest do not change.
-    Returns the index of the next oldest.
+    a period of k cycles are not excited. Bounds, straight ways and the final position do not
+    change. Returns the index of the next oldest.
     """
     k, _, d = past.shape
     for j in range(3):
@@ -62,7 +62,7 @@ def shape(past: FloatArray, place: int, wanted: FloatArray, shaped: FloatArray) 
     place += 1
     if place < k:
         return place
-    # recompute a long-running sum before rounding errors show
+    # compute a long-running sum again before rounding errors become visible
     for j in range(3):
         for i in range(d):
             total = 0.0
@@ -147,7 +147,7 @@ def write_gains(settings: FloatArray, J: FloatArray, scratch: FloatArray) -> Non
 
 
 class WinchFriction(NamedTuple):
-    """Friction of n winches that is compensated in motion, (n,) each."""
+    """Friction of n winches that is compensated in motion; arrays are (n,)."""
 
     known_Nm: FloatArray
     faded_in: FloatArray
@@ -180,11 +180,11 @@ def correct(
 ) -> None:
     """Write the wrench on the platform without its cables (d,), and the loop's correction (d,).
 
-    `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, that of the cables, and
-    the inertia of the wanted motion. `force` is F of the law above. `share` is the part of the last
-    cycle's force that was exerted: below 1, the integral part may only decrease. If the cables'
-    rates contradict each other by more than motion can explain, for example after a cable has
-    broken, the force is reduced. `scale` (d,) is the amount of each direction that counts as 1 N,
+    `moves` (4, 6) has the rows above. `wrench` is the feed-forward part: weight, weight of the
+    cables, and inertia of the wanted motion. `force` is F of the law above. `share` is the part of
+    the last cycle's force that was exerted: below 1, the integral part may only decrease. If the
+    cables' rates contradict each other by more than motion can explain, for example after a cable
+    has broken, the force is reduced. `scale` (d,) is the size in each direction that counts as 1 N,
     or 1 m. `cables` and `pose` are those of the set-point, or of the platform if the loop was
     designed for that. `J` (n, d), `W` (d, n) and `rise` (n,), the excess of tensions at the winches
     over those in the cables' middle, are written from `cables`.
@@ -204,7 +204,7 @@ def correct(
     for k in range(d):
         wrench[k] = all_of_it[directions[k]]
     size, speed, moving = _write_errors(settings, state, scale, directions, moves, e, v)
-    for j in range(d):  # of all directions the controlled ones; both ascend
+    for j in range(d):  # select the controlled directions; both lists ascend
         for k in range(j + 1):
             whole[j, k] = whole[directions[j], directions[k]]
     write_gains(settings, J, scratch)
@@ -252,7 +252,7 @@ def _write_errors(
 
 @jit
 def _saturate(settings: FloatArray, scale: FloatArray, proportional: FloatArray) -> None:
-    """Turn D M^-1 D e, `proportional` (d,), into the proportional part."""
+    """Convert D M^-1 D e, `proportional` (d,), to the saturated proportional part."""
     quarter, norm = 0.25 / settings[RATIO] ** 2, 0.0
     for k in range(proportional.size):
         proportional[k] *= quarter
@@ -264,7 +264,7 @@ def _saturate(settings: FloatArray, scale: FloatArray, proportional: FloatArray)
 
 @jit
 def _give_back(state: FloatArray, J: FloatArray, friction: WinchFriction) -> None:
-    """Remove from the integral part its gain at rest, at most Σ |J_i| friction_i."""
+    """Remove from the integral part its growth at rest, at most Σ |J_i| friction_i."""
     n, d = J.shape
     for k in range(d):
         most = 0.0
@@ -325,11 +325,11 @@ def drive(
 
     Returns whether a motor's limit was reached.
 
-    `feedforward_tensions` lack the loop's correction, which only overcomes friction in the winches,
-    so they determine the stretch of the cables. Winches pull by `rise` (n,) more than the tension
-    in the middle of their cables. The rows of `null` are tensions that exert no wrench:
-    damping along them prevents null-space oscillation of cables that pull against each other. The
-    commanded tension of a cable does not depend on its speed: the mechanism is back-drivable.
+    `feedforward_tensions` do not include the loop's correction, which only overcomes friction in
+    the winches. So they determine the stretch of the cables. Winches pull by `rise` (n,) more than
+    the tension in the middle of their cables. The rows of `null` are tensions without a wrench.
+    Damping along them prevents oscillations of cables that pull against each other. Otherwise the
+    commanded tension of a cable does not depend on its speed, so the mechanism is back-drivable.
     """
     n, limited = tensions.size, False
     for i in range(n):

@@ -5,14 +5,15 @@ tensions t obey, with cables of stiffness k_i = EA/ρ_i and damping b k_i,
 
     m_r s² x = T - τ      M_p s² q = -J^T T - K_G q      T = diag(k (1 + b s)) (J q - x)
 
-K_G = ∂(J^T t - w)/∂q, w the weight, is the geometric stiffness (`CableKinematics`): cables of a
-turned platform pull in other directions, whatever their elasticity. Without T, κ = k (1 + b s),
+K_G = ∂(J^T t - w)/∂q, with the weight w, is the geometric stiffness (`CableKinematics`): cables of
+a turned platform pull in other directions, even if they are rigid. After T is eliminated, with κ =
+k (1 + b s),
 
     x = -G τ      G = diag(1/(m_r s² + κ)) + a J (M_p s² + K_G + J^T diag(m_r s² a) J)^-1 J^T a
 
-a = diag(κ/(m_r s² + κ)). All is taken along the modes of the platform without cables' stretch: J =
-Q R and R^-T M_p R^-1 = U λ U^T, so that the tensions' directions P = Q U are orthonormal, λ is the
-mass of each mode, and the loop's damping and stiffness are diagonal.
+a = diag(κ/(m_r s² + κ)). All matrices are expressed along the modes of the platform on rigid
+cables: J = Q R and R^-T M_p R^-1 = U λ U^T. So the directions of tensions P = Q U are orthonormal,
+λ is the mass of each mode, and the loop's damping and stiffness are diagonal.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ from cdpr_rt.platform.body_kernel import body_of, write_mass_matrix, write_wrenc
 ComplexArray = NDArray[np.complex128]
 
 CABLE_DAMPING_s, LITTLE_DAMPING_s = ASSUMED_DAMPING_s, 5e-4
-"""b, as assumed, and of cables with little damping: 5 % of critical at 30 Hz."""
+"""b as assumed, and b of cables with little damping: 5 % of critical at 30 Hz."""
 _TAUT_N = 1.0
 """Least tension at which a cable's sag is approximated by a flat parabola."""
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
 _OF_GREATEST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.125, 0.375, 1.0)
 NONE, LEAST, BETWEEN, GREATEST, LEVELS = 0, 5, 7, 8, 9
-"""Tensions whose geometric stiffness is computed: none, and from little to the greatest that may be
-planned at a pose, by some doubling per step. A loop that keeps its margin on all these steps, and
-is stable without tensions, is stable with them."""
+"""Levels of tension for the geometric stiffness: zero, and from low tensions to the greatest that
+may be planned at a pose, each about twice the previous one. A loop that is stable without tensions,
+and keeps its margin on all these levels, is stable with tensions."""
 
 
 class LinearPlant(NamedTuple):
@@ -53,7 +54,7 @@ class LinearPlant(NamedTuple):
     mass_kg: FloatArray
     """λ of each mode, (d,)."""
     pulls: FloatArray
-    """P, (n, d): how much longer each cable becomes along each mode."""
+    """P, (n, d): lengthening of each cable along each mode."""
     stiffness_N_m: FloatArray
     """k of each cable, with its sag if it has weight, (LEVELS, n)."""
     geometric_N_m: FloatArray
@@ -63,9 +64,10 @@ class LinearPlant(NamedTuple):
 
 
 def planned_tensions(model: PlatformModel, pose: Pose) -> FloatArray:
-    """Return the least and the greatest tensions (2, n) that carry the weight at a pose, N.
+    """Return the least and the greatest tensions (2, n), N, that carry the weight at a pose.
 
-    Within the planned bounds; if none carry it, the nearest ones.
+    They are within the planned bounds. If none of these carry the weight, they are the nearest
+    ones.
     """
     low, high = model.low_N + model.reserve_N, model.high_N - model.reserve_N
     W, planned = model.kinematics.wrench_matrix(pose), np.zeros((2, model.kinematics.n))
@@ -86,9 +88,9 @@ def geometric_stiffness(model: PlatformModel, pose: Pose, tension_N: FloatArray)
 def whole_stiffness(model: PlatformModel, pose: Pose, tension_N: FloatArray) -> FloatArray:
     """Return ∂(J^T t - w)/∂x (6, 6) of a platform that stands under tensions t (n,).
 
-    In N/m, N/rad, Nm/m and Nm/rad, of all directions: that of the cables, and of the weight m g at
-    r from the origin, -[m g]× [r]× about the axes. Symmetric if t carries the weight, else made
-    symmetric.
+    The result is in N/m, N/rad, Nm/m and Nm/rad, for all directions. It is the geometric stiffness
+    of the cables, plus that of the weight m g at r from the origin, -[m g]× [r]× for rotations. It
+    is symmetric if t carries the weight, otherwise made symmetric.
     """
     K = model.kinematics.geometric_stiffness(pose, tension_N)
     weight, r = weight_at(model, pose)
@@ -132,12 +134,11 @@ def linear_plant(
 
 
 def cable_stiffness(model: PlatformModel, pose: Pose, stiffness_N: FloatArray) -> FloatArray:
-    """Return the stiffness k of cables of EA `stiffness_N` (n,) at the tensions of all levels,
-    (LEVELS, n).
+    """Return the stiffness k (LEVELS, n) of cables with EA `stiffness_N` (n,) at all levels.
 
-    EA/ρ, and in series, if the weight w per length counts, the yield of a flat parabola under its
-    tension t: 12 t³/((w a)² ρ) with a across (Ernst, 1965). Below the least tensions, which are
-    never planned, it is that of the least.
+    It is EA/ρ. If cables have weight w per length, the stiffness of a flat parabola under tension t
+    is in series: 12 t³/((w a)² ρ) with horizontal extent a (Ernst, 1965). For levels below the
+    least tensions, which are never planned, it is that of the least tensions.
     """
     kinematics = model.kinematics
     elastic = stiffness_N / kinematics.lengths(pose)
@@ -190,7 +191,8 @@ def weight_at(model: PlatformModel, pose: Pose) -> tuple[FloatArray, FloatArray]
 OBSERVER_rad_s = 2.0 * math.pi * 400.0
 DAMPING_RATIO = 0.55
 DRIVE_LATENCY_s, _LATENCY_CYCLES = 0.8e-3, 1.5
-"""Assumed delay of any drive, whatever its profile; cycles of transfer and of holding."""
+"""Assumed delay of every drive, independent of its profile; number of cycles for transfer and for
+holding."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,7 @@ class LoopGains:
     """Gains of the loop in a cycle; see `loop_kernel.SETTINGS`."""
 
     bandwidth_rad_s: float
-    """Of each mode of the platform, or less if the damping would be too large."""
+    """Bandwidth of each mode of the platform; lower if the damping would be too large."""
     damping_N_s_m: float
     """Largest damping required of a cable in each mode."""
     smooth: float
@@ -208,7 +210,7 @@ class LoopGains:
     null_damping_N_s_m: float
     """Damping of cables that pull against each other."""
     integral_share: float
-    """Rate of the integral part over 2 ζ ω of the slowest mode, at most."""
+    """Largest rate of the integral part, as a share of 2 ζ ω of the slowest mode."""
     integral_1_s: float
     rotor_kg: float
     """Mass of a rotor, converted to its cable."""
@@ -229,12 +231,12 @@ class LoopMargins:
 
     @property
     def gain(self) -> float:
-        """Least factor by which the gain may grow, or shrink to its inverse: 1/(1 - μ)."""
+        """Gain margin, for an increase and for a decrease of the gain: at least 1/(1 - μ)."""
         return 1.0 / (1.0 - self.modulus)
 
     @property
     def phase_rad(self) -> float:
-        """Least phase error that is tolerated: 2 asin(μ/2)."""
+        """Phase margin: at least 2 asin(μ/2)."""
         return 2.0 * math.asin(0.5 * self.modulus)
 
 

@@ -12,18 +12,18 @@ from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound, jit
 from cdpr_rt.platform.loop_plant import latency_s
 
-# Kernels that learn the torque lost in the motors from the motion of the platform. Of each motor:
-# dry friction, and cogging of as many periods a turn as it has pole pairs. This torque does not
-# reach the platform. With v = q̇_d - q̇ and M = M_p + m_r A, the platform under the loop's force F
-# and the motors' corrections u (n,), all low-passed by L(s) = ω/(s + ω), obeys L F + M ω (v - L v)
-# + Σ J_i/g_i L u_i = Σ J_i/g_i L φ_i·w_i + c, φ = (sign θ̇_d, sin pθ, cos pθ). A Kalman filter
-# finds w (n, 3), Nm, from one of these d equations a cycle. u is the sum of all added torques,
-# whatever their source. c (d,) is a wrench that stays for seconds: a payload, errors of mass and
-# torque constants, a hand that pulls. It is far more uncertain than w, so effects that keep their
-# sign when the motion reverses count as c, not as friction. w is bounded. The filter's states x
-# (m,), m = 3 n + d, are w, row by row, and c. Without evidence from motion they return to 0: ẋ =
-# -x/T + noise, which without a measurement would give a standard deviation σ. `filters` (4 n + 2
-# d,) are φ row by row, u, F and v, low-passed.
+# Kernels that learn the torque losses of the motors from the motion of the platform: dry friction
+# of each motor, and cogging with one period per pole pair. This torque does not reach the platform.
+# With v = q̇_d - q̇ and M = M_p + m_r A, the platform under the loop's force F and the motors'
+# corrections u (n,), all low-passed by L(s) = ω/(s + ω), obeys L F + M ω (v - L v) + Σ J_i/g_i L
+# u_i = Σ J_i/g_i L φ_i·w_i + c, φ = (sign θ̇_d, sin pθ, cos pθ). A Kalman filter finds w (n, 3),
+# Nm, from one of these d equations a cycle. u is the sum of all added torques, whatever their
+# source. c (d,) is a wrench that stays for seconds: a payload, errors of mass and torque constants,
+# a hand that pulls. It is far more uncertain than w, so effects that keep their sign when the
+# motion reverses count as c, not as friction. w is bounded. The filter's states x (m,), m = 3 n +
+# d, are w, row by row, and c. Without information from motion they return to 0: ẋ = -x/T + noise,
+# with a stationary standard deviation σ. `filters` (4 n + 2 d,) are φ row by row, u, F and v,
+# low-passed.
 
 TERMS = 3
 PERIOD, POLE, REVERSAL, LATENCY, NOISE_N, SETTINGS = range(6)
@@ -51,8 +51,8 @@ def write_learnt(
     """Write φ into `terms` (n, 3), and the torques (n,) that compensate what was learnt.
 
     `reference` (n,) is the wanted speed of the motors, `most` (3, n) the bounds of friction,
-    cogging, and both together. A little of the friction is left, because with too much
-    compensation the platform would run ahead.
+    cogging, and both together. A small part of the friction is not compensated, because with too
+    much compensation the platform would run ahead of its set-point.
     """
     for i in range(torque.size):
         angle = pole_pairs[i] * (theta[i] + settings[LATENCY] * omega[i])
@@ -180,7 +180,9 @@ def _low_pass(
 def _fade(
     settings: FloatArray, states: FloatArray, first: int, x: FloatArray, P: FloatArray
 ) -> None:
-    """Let the states from `first` on decay towards 0 by one cycle, and their variances to σ²."""
+    """Let the states from `first` on decay towards 0 for one cycle, and their variances towards
+    σ².
+    """
     for i in range(first, x.size):
         keep = 1.0 - settings[PERIOD] / states[FADING, i]
         x[i] *= keep
@@ -191,18 +193,21 @@ def _fade(
 
 
 POLE_rad_s = 19.0
-"""Pole of the low-pass: below the platform's swinging on its cables, above most of its motion."""
+"""Pole of the low-pass, below the frequency of the platform's swing and above most of its
+motion."""
 FRICTION_SHARE, COGGING_SHARE = 0.04, 0.03
-"""Usual friction and cogging (standard deviation), over the motor's rated torque."""
+"""Usual friction and cogging (standard deviation), as shares of the motor's rated torque."""
 MOST_SHARE, MOST_RESERVE_SHARE = 0.08, 1.0 / 3.0
-"""Bounds of each: the lesser of a share of the rated torque, and of the torque that changes a
-cable's tension by a share of the reserve of planned tensions."""
+"""Bounds of friction and cogging, the lesser of two values: a share of the rated torque, and the
+torque for a change of the cable's tension by a share of the reserve of planned tensions."""
 WRENCH_SHARE, NOISE_SHARE = 0.25, 0.09
-"""Usual errors of the platform's wrench, and of one cycle's equation, over the rated tension."""
+"""Usual errors of the platform's wrench, and of one cycle's equation, as shares of the rated
+tension."""
 REVERSAL_rad_s = 0.1
 MOTORS_FADING_S, WRENCH_FADING_S = 600.0, 300.0
-"""T of the wrench is so long that in a second it changes by less than friction does in a reversal,
-2 % of the cables' rated tension: what changes sign with the motion is not attributed to it."""
+"""T of the wrench. It is so long that the wrench changes in a second by less than friction does in
+a reversal, 2 % of the cables' rated tension. So a torque that changes sign with the motion is not
+attributed to the wrench."""
 _UNSURE = 2.0
 """Number of standard deviations by which friction in motion may exceed that found at rest."""
 _SETTLING_S = 0.3
@@ -223,8 +228,7 @@ class MotorLearning:
         reserve_N: float,
         period_s: float,
     ) -> None:
-        """Take the length that a unit of each direction counts for, `scale` (d,), and the tensions'
-        reserve."""
+        """Take the length for a unit of each direction, `scale` (d,), and the tensions' reserve."""
         n, d = len(axes), scale.size
         m = TERMS * n + d
         rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])
@@ -267,7 +271,7 @@ class MotorLearning:
         force: FloatArray,
         added_Nm: FloatArray,
     ) -> None:
-        """Fix the control's arrays: motors (n,), J (n, d), mass (d, d), error of twist, force.
+        """Bind the control's arrays: motors (n,), J (n, d), mass (d, d), error of twist, force.
 
         `added_Nm` (n,) is the sum of all added torques, including the learnt ones.
         """
@@ -287,28 +291,28 @@ class MotorLearning:
         self._direction = self._learn(self._direction, usable and not self._settling)
 
     def write(self, wanted_rad_s: FloatArray) -> None:
-        """Write `torque_Nm` for motors whose wanted speeds are these (n,)."""
+        """Write `torque_Nm` for these wanted motor speeds (n,)."""
         self._write(wanted_rad_s)
 
     def restart(self) -> None:
-        """Begin again after cycles without this control; what was learnt stays."""
+        """Begin again after cycles without this control; learnt values stay."""
         self._settling = self._cycles
         self._filters[:] = self._terms[:] = self.torque_Nm[:] = 0.0
 
     def forget(self) -> None:
-        """Forget what was learnt, for example after new origins of the encoders."""
+        """Discard learnt values, for example after a change of encoder origins."""
         self.restart()
         self.most_Nm[:2] = self._usual_Nm
         self._x[:] = 0.0
         self._P[:] = np.diag(self._states[SIGMA] ** 2)
 
     def begin_with(self, found: BoolArray, torque_Nm: FloatArray, covariance: FloatArray) -> None:
-        """Begin with what was `found` (n,) at rest for motors that have not been learnt yet.
+        """Begin with results at rest, `found` (n,), for motors that have not been learnt yet.
 
-        `torque_Nm` (n, 3) are friction, sine and cosine of the cogging, `covariance` (n, 3, 3).
-        The bound of friction becomes what was found plus its uncertainty, within that of both
-        together: an almost stationary motor shows its friction elsewhere, under other loads, to a
-        quarter at best.
+        `torque_Nm` (n, 3) are friction, and sine and cosine of the cogging, with `covariance` (n,
+        3, 3). The bound of friction becomes the result plus its uncertainty, limited by the bound
+        of both together. At other angles and under other loads, the friction of an almost
+        stationary motor is accurate to 25 % at best.
         """
         terms = self._x[: TERMS * found.size].reshape(-1, TERMS)
         found = found & ~terms.any(axis=1)  # learning in motion is more reliable
@@ -329,10 +333,10 @@ class MotorLearning:
 
     @property
     def friction_Nm(self) -> FloatArray:
-        """Dry friction of each motor as learnt, (n,); kept up to date."""
+        """Learnt dry friction of each motor, (n,); kept up to date."""
         return self._x[: TERMS * len(self._cable) : TERMS]
 
     @property
     def cogging_Nm(self) -> FloatArray:
-        """Sine and cosine of each motor's cogging over its electrical angle, as learnt, (n, 2)."""
+        """Learnt sine and cosine of each motor's cogging over its electrical angle, (n, 2)."""
         return self._x[: TERMS * len(self._cable)].reshape(-1, TERMS)[:, 1:].copy()

@@ -1,9 +1,10 @@
 """Detection of oscillations of the platform's loop.
 
-If damping, stiffness, mass or delays in files are wrong, a loop designed to be stable may make its
-winches oscillate for as long as it has power. Its commands are bounded, so often no limit is
+If damping, stiffness, mass or delays in files are wrong, a loop designed to be stable may make the
+winches oscillate as long as they have power. The commands are bounded, so often no limit is
 exceeded, but the true tensions are not bounded. The oscillation is detected from the motors'
-angles, which noise does not affect. In motion cogging excites them too, so thresholds are higher.
+angles, which have hardly any noise. In motion cogging also excites the winches, so thresholds are
+higher.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import bound, jit
 
 AT_REST, ALWAYS = 0, 1
-"""Cases: while the set-point rests, and at any time."""
+"""The two cases of detection: while the set-point rests, and at any time."""
 RESERVE_SHARES, LEAST_COUNTS = (0.5, 1.5), 4.0
-"""Amplitude from which a winch oscillates, in each case: the motion that changes its cable's
-tension by this share of the reserve while the platform stands still, but at least so many
+"""Least amplitude of an oscillation, in each case: the motion that changes the cable's tension by
+this share of the reserve while the platform stands still, but at least this number of encoder
 counts."""
 LEAST_Hz, LASTS_S = 5.0, (3.0, 1.0)
 """Least frequency, and least duration without a pause in each case, so that ringing after a motion
-does not count."""
+is not reported."""
 MEAN, SIDE, SINCE, CHANGES, LASTING, ROWS = range(6)
-"""Rows of each motor: mean distance from its set-point, rad; its last side, ±1; time since it
-changed sides, s; number of changes since it oscillates, and duration of that, s."""
+"""Rows of each motor: mean distance from its set-point, rad; last side of that mean, ±1; time since
+the last change of sides, s; number of changes since the oscillation began, and its duration, s."""
 
 
 @jit
@@ -106,7 +107,7 @@ class Oscillation:
 
     @property
     def trouble(self) -> str:
-        """Which winch oscillates and how, "" for none; until `clear`."""
+        """Text on the winch that oscillates, "" for none; until `clear`."""
         if self._found is None:
             return ""
         case, i, frequency_Hz = self._found
@@ -120,6 +121,6 @@ class Oscillation:
         )
 
     def clear(self) -> None:
-        """Forget the finding."""
+        """Clear the result."""
         self._found = None
         self._rows[:] = 0.0

@@ -1,4 +1,4 @@
-"""Platform controllers that users write."""
+"""User-written platform controllers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdpr_rt.model.own_distribution import FADE_S
 
 @dataclass(frozen=True)
 class State:
-    """What a controller knows in a cycle. Arrays are read-only and overwritten in each cycle.
+    """Input of a controller in a cycle. Arrays are read-only and overwritten in each cycle.
 
     A position (d,) has one entry for each controlled direction: the coordinates of the platform's
     origin, m, then the rotation vector from the orientation at home, rad. Velocities and wrenches
@@ -27,7 +27,7 @@ class State:
     velocity: FloatArray
     """Estimated twist, (d,), m/s and rad/s."""
     wrench_matrix: FloatArray
-    """W (d, n): tensions t pull on the platform with the wrench W t, about its origin."""
+    """W (d, n): tensions t exert the wrench W t on the platform, about its origin."""
     wrench: FloatArray
     """Wrench without the cables' tensions if the platform follows the target, (d,), N and Nm.
 
@@ -47,8 +47,8 @@ class State:
     distribute: Callable[[FloatArray], FloatArray]
     """Return the tensions (n,) that exert a force (d,) in addition to carrying `wrench`.
 
-    By the robot's tension distribution. If the bounds leave no such tensions, return
-    those that come nearest.
+    The robot's tension distribution computes them. If no such tensions exist within the bounds,
+    return those that come nearest.
     """
 
 
@@ -62,17 +62,18 @@ class Target:
 
 
 class Controller(ABC):
-    """A platform controller of your own: derive from it and write `update`.
+    """Base class of user-written platform controllers: subclasses write `update`.
 
-    It replaces the built-in controller whenever a platform on tight cables is off its stand. The
-    loop fades to it within 0.2 s. The built-in controller tightens the cables. In every stop it
-    brakes and lowers the platform. The loop limits tensions to the robot's bounds. If `update`
+    The controller replaces the built-in one while a platform on tight cables is off its stand. The
+    loop fades to it within 0.2 s. The built-in controller still tightens the cables, and brakes and
+    lowers the platform in every stop. The loop limits tensions to the robot's bounds. If `update`
     raises, or returns something other than n finite numbers, the loop stops the robot with the
-    fault `not_finite`. After a stop, your controller is used again once the cables are tightened.
+    fault `not_finite`. After a stop, the controller is used again when the cables have been
+    tightened.
     """
 
     def reset(self, state: State) -> None:  # noqa: B027  # optional
-        """Reset all internal state: the next cycle follows one of another controller."""
+        """Reset all internal state, because another controller ran in the last cycle."""
 
     @abstractmethod
     def update(self, state: State, target: Target) -> FloatArray:
@@ -80,7 +81,7 @@ class Controller(ABC):
 
 
 class OwnController:
-    """Asks a `Controller` for the tensions of each cycle, until it fails."""
+    """Calls a `Controller` for the tensions of each cycle, until it fails."""
 
     def __init__(
         self, controller: Controller, state: State, target: Target, last_N: FloatArray
@@ -93,16 +94,16 @@ class OwnController:
         self._fade_cycles = max(1, round(FADE_S / state.period_s))
 
     def restart(self, tension_N: FloatArray) -> None:
-        """Have the controller reset before the next cycle; take the tensions of this one, (n,)."""
+        """Reset the controller before its next cycle; take the tensions of this cycle, (n,)."""
         self._last_N[:] = tension_N
         self._cycle = 0
 
     def stand_in(self) -> None:
-        """Leave the tensions to the built-in controller until `revive`."""
+        """Use the built-in controller until `revive` is called."""
         self._failed = True
 
     def revive(self) -> None:
-        """Use the controller again."""
+        """Use the user's controller again."""
         self._failed, self._cycle = False, 0
 
     @property
@@ -111,10 +112,10 @@ class OwnController:
         return not self._failed
 
     def write(self, tension_N: FloatArray) -> None:
-        """Replace the built-in controller's tensions (n,) by the controller's.
+        """Replace the built-in controller's tensions (n,) by those of the user's controller.
 
         Raises the errors of the controller, and ValueError if it does not return n finite numbers.
-        After that it writes nothing more.
+        After an error it writes nothing more.
         """
         if self._failed:
             return
@@ -124,9 +125,9 @@ class OwnController:
             if self._cycle == 0:
                 self._controller.reset(state)
             wanted = np.asarray(self._controller.update(state, self._target), float)
-        except SystemExit as error:  # it must not end the loop's process
+        except SystemExit as error:  # user code must not end the loop's process
             raise RuntimeError(f"SystemExit: {error}") from error
-        # of numbers that are not all finite neither is the sum
+        # the sum is finite only if all numbers are
         if wanted.shape != tension_N.shape or not math.isfinite(wanted.sum()):
             name, shown = type(self._controller).__name__, np.array2string(wanted, threshold=10)
             raise ValueError(

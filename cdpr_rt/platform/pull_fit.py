@@ -17,31 +17,31 @@ from cdpr_rt.platform.motor_learning import (
     MotorLearning,
 )
 
-# Kernels that fit a motor's friction and cogging to its rotation while its cable was pulled tight.
-# The platform stands at home, so that the length of a cable without tension, l, follows from its
-# tension alone. A tension a is commanded, and the angle θ is measured. With c of cable paid out per
-# radian, and e = -dl/dt, a motor that slides obeys, in Nm at the motor, y = c (l(a) - l(P) - c θ)/e
-# = -(c²/e) θ_P + s c (a - P) + f sign θ̇ + A sin pθ + B cos pθ, with θ_P the angle at which the
-# cable has the tension P, s the relative excess of the tension's growth over the commanded one, f
-# dry friction and (A, B) cogging. If the platform slides on its stand while it is pulled harder
-# than before, which makes the cable longer by m(a) λ, with m going from 0 at P to 1 at the greatest
-# pull, -(c/e) m λ is added. The kernel sums the squares and products of this equation's factors and
-# of y, `sums` (n, 7, 7), lower halves. Friction reverses with the direction over the distance in
-# which a contact yields before it slides: z in -1 to 1 replaces sign θ̇, dz/dθ = (1 - z sign θ̇)/δ
-# (Dahl, 1968). Flicker of an encoder is no motion: `seen` (2, n) are the least and the greatest
+# Kernels that fit a motor's friction and cogging to its rotation while its cable is pulled tight.
+# The platform stands at home, so the unstretched length l of a cable depends on its tension alone.
+# A tension a is commanded, and the angle θ is measured. With c of cable paid out per radian, and e
+# = -dl/dt, a motor that slides obeys, in Nm at the motor, y = c (l(a) - l(P) - c θ)/e = -(c²/e) θ_P
+# + s c (a - P) + f sign θ̇ + A sin pθ + B cos pθ, with θ_P the angle at which the cable has the
+# tension P, s the relative excess of the tension's growth over the commanded one, f dry friction
+# and (A, B) cogging. If the platform slides on its stand while it is pulled harder than before,
+# which makes the cable longer by m(a) λ, with m going from 0 at P to 1 at the greatest pull, -(c/e)
+# m λ is added. The kernel sums the squares and products of this equation's factors and of y, `sums`
+# (n, 7, 7), lower halves. Friction reverses with the direction over the distance in which a contact
+# yields before it slides: z in -1 to 1 replaces sign θ̇, dz/dθ = (1 - z sign θ̇)/δ (Dahl, 1968).
+# Flicker of an encoder does not count as motion: `seen` (2, n) are the least and the greatest
 # angle, as in a model of play.
 
 UNKNOWNS = 5
 ANGLE, STEEPER, FRICTION, SINE, COSINE = range(UNKNOWNS)
-"""Unknowns of each motor; then the slide of the platform, and the measured y."""
+"""Unknowns of each motor; after them the slide of the platform, and the measured y."""
 SLID, MEASURED, FACTORS = range(UNKNOWNS, UNKNOWNS + 3)
 PRETENSION_N, M_PER_RAD, POLE_PAIRS, ORIGIN, PLAY, MOST_SHARE_ROW, MOTOR_ROWS = range(7)
 """Rows of `motors` (6, n): P, c, p, the angle from which θ and θ_P are counted, the play, rad, and
-the greatest commanded tension so far, over P."""
+the greatest commanded tension so far, relative to P."""
 HARDEST_SHARE = 1.5
-"""Greatest pull, over P."""
+"""Greatest pull, relative to P."""
 YIELD_rad = 0.006
-"""δ: that of motors of 1 to 4 Nm; twice or half of it gives nearly the same results."""
+"""δ for motors of 1 to 4 Nm; twice or half this value gives nearly the same results."""
 
 
 @jit
@@ -96,7 +96,7 @@ def take(
 
 @jit
 def _farther(play: float, seen: FloatArray, theta: float, i: int) -> float:
-    """Move the play of motor i along; return the distance beyond the earlier angles, signed."""
+    """Move the play of motor i; return the signed distance beyond the earlier angles."""
     way = 0.0
     if theta > seen[1, i]:
         way = theta - seen[1, i]
@@ -108,10 +108,10 @@ def _farther(play: float, seen: FloatArray, theta: float, i: int) -> float:
 
 
 NOISE_SHARE = 0.01
-"""Standard deviation of a motor's other losses of torque, over its rated torque."""
+"""Standard deviation of a motor's other torque losses, as a share of its rated torque."""
 _STEEPER, _LEAST_STEEP = 0.15, 0.5
-"""Relative error of the growth of a tension (standard deviation), for example from another
-stiffness; and its least growth, over the commanded one."""
+"""Relative error of the growth of a tension (standard deviation), for example due to a wrong
+stiffness; and least growth, relative to the commanded one."""
 _ALIKE_rad = 0.8
 """Electrical angle below which angles of a motor are not independent."""
 _LEAST_SHARE, _MOST_SHARE, _SHARES = 0.3, 1.7, 57
@@ -122,34 +122,36 @@ _ANYWHERE_rad = 1e3
 _COUNTS = 2.0
 """Counts within which the encoder of a stationary motor flickers."""
 _TURNED_rad = 0.005
-"""Rotation in both directions that a motor needs for a reliable result."""
+"""Rotation in each direction that a motor needs for a reliable result."""
 _SLID_rad = 3.0 * YIELD_rad
 """Rotation after which a motor's friction has almost completely reversed."""
 _TOLD = 0.7
-"""The friction of other motors of a kind is used if its standard deviation is below this share of
-the usual one."""
+"""The friction of other motors of the same kind is used if its standard deviation is below this
+share of the usual friction."""
 _MISFIT = 3.0
-"""Residual over noise above which a fit is rejected, for example because the platform moved."""
+"""Ratio of residual to noise above which a fit is rejected, for example because the platform
+moved."""
 _SLIDE_m = 0.005
 """Usual slide of a platform on its stand (standard deviation), at its anchor points."""
 _SLIDES = (10.8, 13.8, 16.3)
-"""Chi squared of one to three slides that noise exceeds once in a thousand."""
+"""Chi squared, for one to three slide directions, that noise exceeds once in a thousand."""
 _SLOW_SHARE, _UNLIKE = 0.8, 0.25
-"""Friction in motion, over that of an almost stationary motor; relative scatter of a kind."""
+"""Ratio of friction in motion to that of an almost stationary motor; relative scatter among motors
+of a kind."""
 
 
 class PullFit:
     """Friction, cogging and the angle at the pretension of each motor, while the platform stands.
 
-    See above; a least-squares fit to all cycles, with usual friction and cogging as prior (zero,
-    with the standard deviations of `MotorLearning`). Motors of a kind, with the same gear, have
-    similar friction: if a motor's own friction hardly reverses, that of the others is expected.
-    Motors that are `known` (n,) are not fitted. The `learning` starts from the results.
+    See above. It is a least-squares fit to all cycles, with a prior of zero friction and cogging
+    and the standard deviations of `MotorLearning`. Motors of a kind, with the same gear, have
+    similar friction: if a motor hardly reverses, the friction of the others is its prior. Motors
+    that are `known` (n,) are not fitted. The `learning` starts from the results.
 
     A platform that slides on its stand while it is pulled harder than before makes all cables
-    longer by `slides` Δ. Δ (k,) is only used if it is significant: Δ^T C^-1 Δ, over the remaining
-    variance, is above what noise alone exceeds once in a thousand (data snooping, as in Baarda,
-    1968). Else the platform counts as stationary.
+    longer by `slides` Δ. Δ (k,) is only used if it is significant: Δ^T C^-1 Δ, divided by the
+    remaining variance, must exceed the value that noise alone exceeds once in a thousand (data
+    snooping, as in Baarda, 1968). Otherwise the platform counts as stationary.
     """
 
     def __init__(
@@ -160,9 +162,9 @@ class PullFit:
         learning: MotorLearning | None,
         slides: FloatArray,
     ) -> None:
-        """Take the function of the lengths without tension (n,) at home for tensions (n,).
+        """Take the function that returns the unstretched lengths (n,) at home for tensions (n,).
 
-        `slides` (n, k), k up to 3, is how much longer each cable becomes for each way in which the
+        `slides` (n, k), k up to 3, is the lengthening of each cable for each direction in which the
         platform may slide, in m per m at its anchor points.
         """
         n = len(axes)
@@ -181,7 +183,7 @@ class PullFit:
         usual = np.full((n, UNKNOWNS), [_ANYWHERE_rad, _STEEPER, np.inf, 1.0, 1.0])
         usual[:, FRICTION + 1 :] = COGGING_SHARE * self._rated_Nm[:, None]
         self._usual_precision = np.eye(UNKNOWNS) * usual[:, None] ** -2.0
-        """Of all unknowns but friction, (n, 5, 5)."""
+        """Prior information about all unknowns except friction, (n, 5, 5)."""
         self._shares = np.linspace(_LEAST_SHARE, _MOST_SHARE, _SHARES)
         self._lengths = np.ones((2, _SHARES, n))
         self.count_rad = np.array([math.tau / axis.winch.encoder_counts_per_turn for axis in axes])
@@ -208,10 +210,10 @@ class PullFit:
             row[:] = self._lengths_at_home(share * tension_N) - at_tension
         slope = np.gradient(self._lengths[0], self._shares, axis=0)
         self._lengths[1] = -slope / pretension_N
-        self.end()  # loads the parts of numpy that must not be loaded in a cycle
+        self.end()  # loads parts of numpy that must not be loaded in a cycle
 
     def begin(self, position_rad: FloatArray) -> None:
-        """Begin again, at these angles (n,), to which the cables have been reeled in."""
+        """Begin again at these angles (n,), at which the cables have been reeled in."""
         self._motors[ORIGIN] = position_rad
         self._motors[MOST_SHARE_ROW] = 1.0
         self._seen[:] = self._turned[:] = self._sums[:] = 0.0
@@ -241,7 +243,8 @@ class PullFit:
     def begin_learning(self) -> None:
         """Begin the learning with the last results, for motors that it does not know yet.
 
-        Over less than a period cogging looks like another stiffness, so it is left out.
+        If a motor turned by less than a period, its cogging looks like another stiffness and is
+        left out.
         """
         if self._learning is None:
             return
@@ -257,7 +260,9 @@ class PullFit:
         self._learning.begin_with(self._found, torques, covariance)
 
     def _expected(self, sums: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return each motor's friction expected from the others, and its standard deviation."""
+        """Return the friction of each motor expected from the others, and its standard
+        deviation.
+        """
         zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
         misfit, x, covariance = self._fit(sums, zero, usual_Nm)
         alone_Nm, variance = x[:, FRICTION], covariance[:, FRICTION, FRICTION]
@@ -267,10 +272,10 @@ class PullFit:
     def _slide(
         self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
     ) -> FloatArray:
-        """Return by how much the platform has slid, (k,), 0 if that is not significant.
+        """Return how far the platform has slid, (k,), 0 if that is not significant.
 
-        The other unknowns of each motor are eliminated: a_i and b_i are the remainders of the
-        squares of the slide's factor, and of its product with the measured y.
+        The other unknowns of each motor are eliminated: a_i and b_i are what remains of the squared
+        factor of the slide, and of its product with the measured y.
         """
         m, slid, slides = UNKNOWNS, SLID, self._slides
         none = np.zeros(slides.shape[1])
@@ -292,15 +297,15 @@ class PullFit:
     def _of_their_kind(
         self, told: FloatArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the friction of the others of each motor's kind, (n,): mean, standard deviation.
+        """Return mean and standard deviation (n,) of friction of the other motors of each kind.
 
-        It uses the friction found for each alone, with the prior 0 ± `usual_Nm`, and its variance.
-        Evidence of a motor beyond the prior has the weight `told` (n,), 0 to 1. Without evidence
-        from the others the result is 0 ± `usual_Nm` and a quarter of it.
+        It uses the friction found for each motor alone, with the prior 0 ± `usual_Nm`, and its
+        variance. `told` (n,), 0 to 1, is the weight of a motor's own data relative to the prior.
+        Without evidence from the others the result is 0 ± `usual_Nm` and a quarter of it.
         """
         others = (self._of_a_kind & ~np.eye(told.size, dtype=np.bool_)) * told
         precision = np.maximum(1.0 / variance - usual_Nm**-2.0, 0.0)
-        weighted = friction_Nm / variance  # weighted by the precision of this motor's evidence
+        weighted = friction_Nm / variance  # weighted by the precision of this motor's data
         mean_Nm = (others @ weighted) / (others @ precision + usual_Nm**-2.0)
         unlike = (_UNLIKE**2 * (mean_Nm**2 + usual_Nm**2))[:, None]
         counts = others / (1.0 + others * precision * unlike)
@@ -308,7 +313,7 @@ class PullFit:
         return (counts * weighted).sum(axis=1) / known, np.sqrt(unlike[:, 0] + 1.0 / known)
 
     def _weighted_sums(self) -> FloatArray:
-        """Return the sums (n, 7, 7) over the variance of a motor's other losses of torque."""
+        """Return the sums (n, 7, 7), divided by the variance of the motor's other torque losses."""
         sums = self._sums + np.swapaxes(np.tril(self._sums, -1), 1, 2)
         noise = self._alike_rad * (NOISE_SHARE * self._rated_Nm) ** 2
         return np.asarray(sums / noise[:, None, None])
@@ -316,9 +321,9 @@ class PullFit:
     def _fit(
         self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return each motor's residual over noise, (n,), the results, (n, 5), and their covariance.
+        """Return each motor's ratio of residual to noise, (n,), results, (n, 5), and covariance.
 
-        Its friction is expected to be `friction_Nm` ± `spread_Nm`, (n,). Covariances are (n, 5, 5).
+        The prior of the friction is `friction_Nm` ± `spread_Nm`, (n,). Covariances are (n, 5, 5).
         """
         m, y = UNKNOWNS, MEASURED
         products, rest = sums[:, :m, :m], sums[:, :m, y]
@@ -348,7 +353,7 @@ class PullFit:
 
 
 def _moved_back(sums: FloatArray, longer_m: FloatArray) -> FloatArray:
-    """Return the sums (n, 7, 7) for cables that had not become longer, by `longer_m` (n,)."""
+    """Return the sums (n, 7, 7) after removing a lengthening `longer_m` (n,) of the cables."""
     moved, slid, y = sums.copy(), sums[:, :, SLID] * longer_m[:, None], MEASURED
     moved[:, :, y] -= slid
     moved[:, y, :] = moved[:, :, y]

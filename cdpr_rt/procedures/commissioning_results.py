@@ -34,19 +34,22 @@ from cdpr_rt.identification.thesis import ThesisResult, identify_thesis
 from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.measurement import Recording, recording
 
-# Judges recorded validation runs, on the encoder or on an angle that is known better.
+# Evaluation of recorded validation runs, by the encoder or by a more accurate angle.
 
 METHODS = ("none", "thesis", "harmonic")
-"""Compensations that are compared: without, the thesis' and the harmonic model."""
+"""Compensations that are compared: none, the thesis' method and the harmonic model."""
 
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 
 AngleOf = Callable[[RawLog, Recording], FloatArray]
-"""Returns the angle from the index, (samples,), with which a recorded pass is evaluated."""
+"""Function that returns the angle from the index, (samples,), with which a recorded pass is
+evaluated."""
 
 
 def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
-    """Return the worst of each figure over the passes; by default with the encoder's angle."""
+    """Return the worst value of each figure over the passes; by default with the encoder's
+    angle.
+    """
     figures = []
     for path in paths:
         log = read_raw_log(path)
@@ -153,7 +156,7 @@ class Identified:
 
 def legs(paths: list[Path]) -> list[SweepData]:
     """Return recorded passes in the form that the identification needs; raises RawLogError."""
-    # nothing but the sweep stays in memory: a recording is large
+    # only the sweep stays in memory, because a recording is large
     return [recording(read_raw_log(path)).sweep for path in paths]
 
 
@@ -219,8 +222,7 @@ TARGETS = {
     "thesis": {"rms_position_error": 3.0, "peak_pid_effort": 6.0, "peak_velocity_error": 5.0},
     "harmonic": {"rms_position_error": 10.0, "peak_pid_effort": 10.0, "peak_velocity_error": 8.0},
 }
-"""Target ratios to the figures without compensation: those of the thesis, and those of this
-project."""
+"""Target ratios to the figures without compensation: of the thesis, and of this project."""
 
 
 _Positive = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -258,7 +260,7 @@ class _Pid(_Part):
     crossover_Hz: _Positive
     phase_margin_deg: _Number
     gain_margin_dB: _Number | None
-    """None if the loop is stable with any gain."""
+    """Gain margin; None if the loop is stable with every gain."""
     sensitivity_peak: _Positive
 
 
@@ -286,7 +288,7 @@ class _Run(_Part):
 
 
 def read_run(paths: Paths) -> dict[str, Any]:
-    """Return the data of the run on the bus; raises InvalidRequestError if a part is missing."""
+    """Return the data of the commissioning run; raises InvalidRequestError if a part is missing."""
     try:
         read_json_model(paths.run, _Run)
         run: dict[str, Any] = read_json(paths.run)
@@ -304,7 +306,7 @@ def assemble(
 
     The validation uses `true_angle` of a simulator if there is one, else the encoder's angle.
     """
-    # runs from before this was noted are all of drives that take per mille
+    # older runs do not contain this; all of them used drives with torque in per mille
     run = {"torque_step_Nm": run["rated_torque_Nm"] / 1000.0, **run}
     return {
         "ok": True,

@@ -26,15 +26,17 @@ class PoseRefusedError(Exception):
 
 
 class NotThePoseError(TripError):
-    """The motion ended for a reason that does not depend on the pose, such as an emergency stop."""
+    """The motion ended for a reason independent of the pose, such as an emergency stop."""
 
 
 @dataclass(frozen=True)
 class TargetNotReached:
-    """A platform that has not reached its target in time; the robot holds it there."""
+    """The platform has not reached its target in time; the robot holds it at its present
+    position.
+    """
 
     place: FloatArray
-    """Present place (d,), according to its controller."""
+    """Present position (d,), according to the controller."""
     why: str
 
 
@@ -56,7 +58,7 @@ class PoseReader(Protocol):
     """Reads a platform's cables and its camera, on any robot and bus."""
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; raises TripError if the motion ends meanwhile."""
+        """Let time pass; raises TripError if the motion ends during that time."""
 
     def read(self, seconds: float) -> Readings:
         """Let time pass and return the readings; raises TripError."""
@@ -66,10 +68,10 @@ class PoseReader(Protocol):
 
 
 class PlatformOperator(PoseReader, Protocol):
-    """Also moves a platform."""
+    """A pose reader that also moves the platform."""
 
     def move_to(self, place: FloatArray) -> TargetNotReached | None:
-        """Move the platform to a place (d,); return None if it has arrived.
+        """Move the platform to a position (d,); return None if it has arrived.
 
         Raises PoseRefusedError, and TripError if the motion ends early.
         """
@@ -83,9 +85,9 @@ class PoseNotifier(Protocol):
 
 
 def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
-    """Wait until the platform stands still, and return the readings there.
+    """Wait until the platform stands still, and return the readings at that pose.
 
-    Raises PoseRefusedError if it does not come to rest within some ten readings.
+    Raises PoseRefusedError if the platform does not come to rest within about ten readings.
     """
     operator.wait(SETTLE_S)
     for _ in range(_MOST_READINGS):
@@ -108,12 +110,12 @@ class Measured:
     keep: Callable[[], None]
     readings: list[PoseReading] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
-    """Reasons why places were not read."""
+    """Positions that were not read, with the reasons."""
     tried: list[tuple[float, ...]] = field(default_factory=list)
-    """Places (d,) that were not read or not reached, and are not tried again."""
+    """Positions (d,) that were not read or not reached, and are not tried again."""
     failures: int = 0
-    """Number of places in a row that were not reached, or at which the platform did not come to
-    rest."""
+    """Number of successive positions that were not reached, or at which the platform did not come
+    to rest."""
 
     def add(self, reading: PoseReading) -> None:
         """Add a reading."""
@@ -121,14 +123,14 @@ class Measured:
         self.keep()
 
     def leave_out(self, place: FloatArray, why: str) -> None:
-        """Leave out a place (d,) that cannot be read."""
+        """Leave out a position (d,) that cannot be read."""
         self.refused.append(f"{_listed(place)}: {why}")
         self.tried.append(tuple(place.tolist()))
 
     def interrupted(self, place: FloatArray, error: TripError) -> None:
-        """Leave out a place (d,) at which the motion ended, if the place may be the cause."""
+        """Leave out a position (d,) at which the motion ended, if the position may be the cause."""
         if not isinstance(error, NotThePoseError):
-            # nobody knows whether it would not happen there again
+            # the same may happen there again
             self.leave_out(place, str(error))
 
 
@@ -139,11 +141,11 @@ def measure_poses(
     measured: Measured,
     notifier: PoseNotifier,
 ) -> None:
-    """Go to places (d,) and read each; go through `between` if the straight way is rejected.
+    """Move to positions (d,) and read each; go through `between` if the straight way is rejected.
 
-    One that is not reached is read where the platform stands, also on the way by `between`.
-    Raises TripError where the motion is ended, or where five places in turn are not reached or do
-    not come to rest.
+    If a position is not reached, the reading is taken where the platform stands, also on the way
+    through `between`. Raises TripError if the motion is ended, or if the platform does not reach
+    five successive positions or does not come to rest there.
     """
     for place in places:
         what = f"pose {len(measured.readings) + 1}, at {_listed(place)}"
@@ -181,7 +183,7 @@ def _go(
 def _read(
     operator: PlatformOperator, place: FloatArray, held: TargetNotReached | None, measured: Measured
 ) -> str:
-    """Read a pose where the platform stands; return the problem, "" for none."""
+    """Read the pose at which the platform stands; return the problem, or ""."""
     try:
         reading = read_pose(operator, place if held is None else held.place)
     except PoseRefusedError as error:

@@ -21,7 +21,7 @@ from cdpr_rt.motion.trajectory import TrapezoidalMove
 Index = Literal["homing", "probe"]
 """How to find the encoder index: by homing, or by the touch probe during a normal motion."""
 
-# the rotor trails the set-point by friction over gain; both directions' trail fits in here
+# the rotor lags the set-point by friction over gain; the lag in both directions fits in here
 SWEEP_LEAD_IN_RAD = math.radians(30.0)
 
 
@@ -30,14 +30,15 @@ class Pass:
     """One pass at constant speed: motor angle to cover after a lead-in, in one direction."""
 
     speed_rad_s: float
-    """Signed."""
+    """Speed of the pass, signed."""
     lead_in_rad: float
-    """Covered first and not evaluated, so that friction and controller have settled."""
+    """Angle that is covered first and not evaluated, so that friction and controller have
+    settled."""
     distance_rad: float
     ramp_s: float = 0.5
     """Time to reach the speed, and to stop."""
     with_ramps: bool = False
-    """Whether to evaluate the ramps too, which the inertia requires."""
+    """Whether to evaluate the ramps too, which is required for the inertia."""
 
     def move(self, start_rad: FloatArray) -> TrapezoidalMove:
         """Return the set-point of n axes that start at `start_rad` (n,)."""
@@ -103,10 +104,10 @@ class Recording:
     effort_Nm: FloatArray
     cycle: FloatArray
     judged: BoolArray
-    """The samples to evaluate: at full speed after the lead-in."""
+    """Samples to evaluate: at full speed after the lead-in."""
     period_s: float
     complete: bool
-    """False if the recording ends before the pass."""
+    """Whether the pass is complete; False if the recording ends before the pass."""
 
 
 def recording(log: RawLog) -> Recording:

@@ -1,4 +1,4 @@
-"""A path for one robot: from its file to samples in time, or to the first infeasible place."""
+"""A path for one robot: from its file to samples in time, or to the first infeasible position."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from cdpr_rt.motion.path.time_scaling import (
     time_path,
 )
 
-# Paths in wrong units: 25.4 or 1000 times as large, or as small, as the robot's workspace has
-# it. A slip is only called one where the path fits once it is undone.
+# Paths in wrong units, which are too large or too small by a factor of 25.4 or 1000 for the robot's
+# workspace. A mistake is reported only if the path fits after its correction.
 
 _FACTORS: Final = {
     1.0 / 25.4: "25.4 times too large: mm read as inches (G20 instead of G21)",
@@ -47,7 +47,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
     k = path.coordinates.positions
     points = path.points[:, :k]
     inside = ((points >= low_m) & (points <= high_m)).all(axis=1)
-    if inside.all() or path.in_room:  # units do not explain positions in the room
+    if inside.all() or path.in_room:  # wrong units do not explain positions in the room
         return
     size, room = np.ptp(points, axis=0), high_m - low_m
     line = path.lines[int((~inside).argmax())]
@@ -68,7 +68,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
 
 
 def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> str:
-    """Return the likely mistake of units, from the size of a path inside the box; "" for none."""
+    """Return the likely mistake of units, by the size of a path inside the box; "" for none."""
     points = path.points[:, : path.coordinates.positions]
     size, room = np.ptp(points, axis=0), high_m - low_m
     if not size.any() or (size > _SMALL * room).any():
@@ -92,12 +92,12 @@ _ROUNDING_m: Final = 1e-8
 """Tolerance of a position at the sides of the box, in m and rad."""
 
 Advance = Callable[[str, float], None]
-"""Receives the present step, and the completed share of the whole."""
+"""Function that is called with the present step and the completed share of the whole."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """The first infeasible place of a path."""
+    """The first infeasible position of a path."""
 
     line: int
     """Line in the path's file."""
@@ -115,9 +115,9 @@ class PathPlan:
     limits: PathLimits
     obstacle: Obstacle | None
     timed: TimedPath | None
-    """None if the obstacle was found before timing."""
+    """The path in time; None if the obstacle was found before timing."""
     constant_s: float
-    """Duration at the constant speed and acceleration that every place allows."""
+    """Duration at a constant speed and acceleration that all positions allow."""
     slowed: int
     """Number of moves whose wanted speed the robot never reaches."""
     next_line: int | None = None
@@ -153,8 +153,8 @@ class PathPlanner:
     ) -> PathPlan:
         """Return the plan of a path from a line on, as much of it as fits into one plan.
 
-        The platform rests where the plan ends. The first plan of a path also checks the places of
-        the later ones. Raises PathError for a path with wrong units.
+        The platform rests at the end of the plan. The first plan of a path also checks the
+        positions of the later ones. Raises PathError for a path with wrong units.
         """
         advance("corners", 0.0)
         size_fault(path, *self._box())
@@ -205,10 +205,10 @@ class PathPlanner:
     # -- parts
 
     def _divide(self, path: PathDescription, begin: int) -> list[int]:
-        """Return where plans end, as numbers of moves; each lasts as long as one plan may take.
+        """Return where plans end, as numbers of moves; each plan is as long as allowed.
 
-        It adds up the shortest times of moves to half the longest plan, to leave time for braking.
-        Raises PathError for a move that takes too long.
+        The shortest times of moves are added up to half the longest plan, to leave time for
+        braking. Raises PathError for a move that takes too long.
         """
         k = self.model.positions
         points = path.points
@@ -235,7 +235,7 @@ class PathPlanner:
         lines = [move.line for move in path.moves[begin:]]
         for i, share in enumerate(used):
             total += share
-            # only between lines, so that a line number says where to continue
+            # plans end only between lines, so that a line number says where to continue
             if total > 1.0 and i and lines[i] != lines[i - 1]:
                 ends.append(begin + i)
                 total = float(share)
@@ -283,9 +283,9 @@ class PathPlanner:
         return wrenches, self._first(nodes, obstacle, self._contact(nodes))
 
     def _outside(self, nodes: PathNodes, low: FloatArray, high: FloatArray) -> Obstacle | None:
-        """Return the first place outside the box of targets or turned too far.
+        """Return the first position outside the box of targets or turned too far.
 
-        The curve between two nodes is checked at four places.
+        The curve between two nodes is checked at four positions.
         """
         first: tuple[float, Obstacle] | None = None
         for part in (0.0, 0.25, 0.5, 0.75):
@@ -294,7 +294,7 @@ class PathPlanner:
             if found is None or (first is not None and first[0] <= found[0] + part):
                 continue
             i, text = found
-            # the interval after a node is of the line of the next one
+            # the interval after a node belongs to the line of the next node
             line = int(nodes.line[i if part == 0.0 else min(i + 1, len(nodes.line) - 1)])
             first = i + part, Obstacle(line, places[i].copy(), text)
         return None if first is None else first[1]
@@ -324,8 +324,7 @@ class PathPlanner:
         )
 
     def _wrenches(self, nodes: PathNodes) -> tuple[WrenchBounds, Obstacle | None]:
-        """Return the bounds of wrenches along the path, or the first place where the cables cannot
-        hold the platform."""
+        """Return the bounds of wrenches along the path, or the first infeasible position."""
         model = self.model
         chosen = self.looked_at(nodes)
         positions = nodes.q[chosen]
@@ -400,7 +399,7 @@ class PathPlanner:
         return np.flatnonzero(fresh).astype(np.int64)
 
     def infeasibility(self, position: FloatArray) -> str:
-        """Return why the platform is not held at rest at a position (d,)."""
+        """Return the reason why the cables cannot hold the platform at rest at a position (d,)."""
         model = self.model
         workspace = model.workspace(0.0)
         why = workspace.infeasibility(model.pose(position))
@@ -424,7 +423,7 @@ class PathPlanner:
         return float(times.sum() + nodes.dwell_s.sum())
 
     def _slowed(self, nodes: PathNodes) -> int:
-        """Return how many moves ask for more speed than the robot has."""
+        """Return the number of moves that require more speed than the robot has."""
         finite = np.isfinite(nodes.speed)
         k = self.model.positions
         most = np.where(
@@ -435,7 +434,7 @@ class PathPlanner:
         return int(np.unique(nodes.line[finite & (nodes.speed > most)]).size)
 
 
-# The tensions that a planned path takes, by the robot's own distribution.
+# The tensions along a planned path, by the robot's own distribution.
 
 _MOST: Final = 20_000
 
@@ -445,7 +444,7 @@ class PathTensions:
     """Tensions at a plan's samples, or at evenly chosen ones if there are too many."""
 
     sample: IntArray
-    """Numbers of these samples, (m,)."""
+    """Indices of these samples, (m,)."""
     tension_N: FloatArray
     """(m, n)"""
     low_N: FloatArray

@@ -1,1 +1,1 @@
-"""Programs: the set-points and controllers that a running robot can be commanded to run."""
+"""Programs that a command starts on a running robot: set-points and their controllers."""

@@ -14,7 +14,7 @@ from cdpr_rt.programs.model import AxesModel
 
 
 class PositionLoop:
-    """One PID for all programs that follow a position; it keeps its state from one to the next."""
+    """One PID for all programs that follow a position; its state survives a change of program."""
 
     def __init__(self, model: AxesModel) -> None:
         known = None
@@ -25,7 +25,7 @@ class PositionLoop:
         self._torque_Nm = np.zeros(model.n)
 
     def take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
-        """Keep the state if the last cycle was this loop's, else begin with its torques (n,)."""
+        """Keep the state if this loop ran in the last cycle, else begin with the torques (n,)."""
         next_cycle = feedback.cycle - self._cycle in (0, 1)
         if not (next_cycle and np.array_equal(torque_Nm, self._torque_Nm)):
             self.controller.take_over(torque_Nm)
@@ -38,14 +38,15 @@ class PositionLoop:
 
 
 BumplessController = PositionLoop | BumplessTransfer
-"""Controls the axes without a torque step at its start."""
+"""Controller of the axes, which starts without a torque step."""
 
 
 class AxisProgram(CommandedProgram):
     """Moves the axes' set-points within the model's bounds.
 
-    Used directly it is the program `hold`, which brakes moving axes and holds them where they come
-    to rest. Subclasses override `_move`, and `check` and `_apply` for their commands.
+    An instance of this class is the program `hold`, which brakes moving axes and holds them where
+    they come to rest. Subclasses override `_move`, and also `check` and `_apply` if they take
+    commands.
     """
 
     name = "hold"
@@ -80,7 +81,7 @@ class AxisProgram(CommandedProgram):
         return self._ramp(self._zero_velocity, setpoint)
 
     def _ramp(self, velocity_rad_s: FloatArray, setpoint: Setpoint) -> bool:
-        """Ramp the set-point's velocity to this one, (n,); return whether all stand still."""
+        """Ramp the set-point's velocity to a given one (n,); return whether all axes rest."""
         model = self._model
         bounds = model.acceleration_rad_s2, model.period_s
         return ramp_velocity(velocity_rad_s, *bounds, *setpoint.arrays)
@@ -90,14 +91,14 @@ class AxisProgram(CommandedProgram):
 
 _LEAST_SHARE = 1e-6
 _LEAST_DISTANCE_RAD = 1e-9
-"""Shorter moves are not synchronised: ratios of their distances may overflow."""
+"""Shorter moves are not synchronised, because ratios of their distances may overflow."""
 
 
 class PointToPoint:
-    """Takes the set-points to a target; axes that start from standstill arrive together.
+    """Moves the set-points to a target; axes that start from standstill arrive together.
 
-    The path is then the straight line from start to target. Axes that are already moving continue
-    within their own bounds.
+    In this case the path is the straight line from start to target. Axes that are already moving
+    continue within their own bounds.
     """
 
     def __init__(self, model: AxesModel) -> None:
@@ -113,7 +114,7 @@ class PointToPoint:
         self._distance[:] = 0.0
 
     def set_out(self, target_rad: FloatArray, setpoint: Setpoint, speed_rad_s: FloatArray) -> None:
-        """Go to `target_rad` (n,) at `speed_rad_s` (n,) at the most."""
+        """Start towards `target_rad` (n,), with `speed_rad_s` (n,) at most."""
         self.target_rad[:] = target_rad
         self._distance[:] = np.abs(target_rad - setpoint.position_rad)
         self._speed[:] = speed_rad_s

@@ -16,11 +16,11 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.jit import jit
 from cdpr_rt.refusal import CommandRefusal, RefusalCode, shown
 
-# Arguments of a command to a program: typed, bounded, rejected with a message.
+# Arguments of a command to a program: checked for type and range, rejected with a message.
 
 
 class ProgramError(ControlError):
-    """A command that a program refuses; the message names the key and value."""
+    """A program rejects a command; the message names the key and value."""
 
 
 class CommandArguments:
@@ -62,8 +62,8 @@ class CommandArguments:
     ) -> FloatArray:
         """Return one number per axis, (n,), of magnitude up to `limit` (n,).
 
-        With `optional` an axis may have no number (null), which is nan in the result. `each` is the
-        text of a refusal that names the meaning of each number, by default an axis.
+        With `optional`, the number of an axis may be null, which becomes nan in the result. `each`
+        is the term that error messages use for one of the numbers, by default an axis.
         """
         value = self._arguments.get(key)
         if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != limit.size:
@@ -90,38 +90,38 @@ class CommandArguments:
 
 
 REST_S: Final = 5.0
-"""The longest time that a set-point within its bounds takes to come to rest."""
+"""The longest time in which a set-point within its bounds comes to rest."""
 
 
 class Program(ABC):
     """A set-point over time and the controller that follows it.
 
-    One program runs at a time. The next one continues from the last one's set-point and torque, so
-    that neither steps. `update` allocates nothing, does no I/O and reads no clock: time advances by
-    one period per call. The methods that are not abstract suit a program without arguments,
-    platform and stream.
+    One program runs at a time. The next program continues from the set-point and torque of the last
+    one, without a step in either. `update` allocates nothing, does no I/O and reads no clock: time
+    advances by one period per call. The methods that are not abstract have defaults for a program
+    without arguments, platform and stream.
     """
 
     name: str
     controller: Controller
     """The controller whose effort and compensation are recorded."""
     needs_lease: bool
-    """Whether it runs only while the client that started it holds the right to move."""
+    """Whether the program runs only while the client that started it has the right to move."""
 
     @abstractmethod
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Continue from the last cycle's set-point and torque, (n,) each."""
 
     def preparation(self, _arguments: Mapping[str, Any]) -> Callable[[], None] | None:
-        """Return the preparation of a command with these arguments, None for nothing.
+        """Return a function that prepares a command with these arguments, or None.
 
-        It may take long, for example to read a file, and is called in another thread. If it raises,
-        the command is rejected.
+        The function may take long, for example to read a file, and is called in another thread. If
+        it raises, the command is rejected.
         """
         return None
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return checked arguments for `apply`; raises ProgramError, and changes nothing.
+        """Return checked arguments for `apply`; raises ProgramError. It changes nothing.
 
         The program need not be running.
         """
@@ -149,7 +149,7 @@ class Program(ABC):
 
     @property
     def rest_s(self) -> float:
-        """Longest time from a stop until it is at rest, s."""
+        """Longest time from a stop until the program is at rest, s."""
         return REST_S
 
     @property
@@ -164,16 +164,16 @@ class Program(ABC):
 
     @property
     def stream_age_s(self) -> float:
-        """Age of the newest sample that it follows, s, nan if it follows none."""
+        """Age of the newest sample of the stream, s; nan if the program follows no stream."""
         return math.nan
 
     @property
     def stream_buttons(self) -> int:
-        """Buttons of the sample that it plays, 0 if it follows none."""
+        """Buttons of the present sample of the stream; 0 if the program follows no stream."""
         return 0
 
     def progress(self) -> dict[str, Any]:
-        """Return progress for the status, such as the part done; not called in every cycle."""
+        """Return the progress for the status, such as the share done; not called in every cycle."""
         return {}
 
 
@@ -228,7 +228,7 @@ def _fade(
 
 
 class BumplessTransfer:
-    """Adds to a controller's torque the difference to the last one's, faded out over 0.2 s.
+    """Fades out the torque difference between the last controller and a new one over 0.2 s.
 
     torque = u + s·(torque_0 - u_0), s from 1 to 0; `limit_Nm` (n,) bounds the sum.
     """

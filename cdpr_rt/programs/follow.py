@@ -31,17 +31,18 @@ def _lead(
     """Add the stream's motion to the targets, which stay within the axes' stopping distance."""
     for i in range(min(3, target.size)):
         target[i] += scale * (pose[i] - last[i]) / cable[i]
-        # an axis slower than the stream must not run on after the stream has stopped
+        # an axis that is slower than the stream must not continue after the stream has stopped
         reach = speed[i] * (0.5 * speed[i] / acceleration[i] + _LEAD_S)
         target[i] = min(max(target[i], position[i] - reach), position[i] + reach)
         last[i] = pose[i]
 
 
 class FollowProgram(AxisProgram):
-    """Pays out cable as the stream's pose moves: x, y and z are axes 0, 1 and 2.
+    """Pays out cable according to the stream: x, y and z are the axes 0, 1 and 2.
 
-    It follows the displacement since the stream began, times its scale; all other axes hold.
-    Without new samples the motion ends at the last one. After the stream's time-out the axes brake.
+    The axes follow the displacement since the stream began, multiplied by its scale; all other axes
+    hold. Without new samples the motion ends at the last one. After the timeout of the stream the
+    axes brake.
     """
 
     name = "follow"
@@ -53,13 +54,13 @@ class FollowProgram(AxisProgram):
         self._epoch = -1
         self._last = np.zeros(3)
         self._target = np.zeros(model.n)
-        # compiled here, not in the cycle in which the stream begins
+        # this call compiles the kernel before the cycle in which the stream begins
         self._follow(np.zeros(model.n), 0.0)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Continue from the last set-point and torque; brake until the stream begins."""
         super().start(feedback, setpoint, torque_Nm)
-        # where the axes come to rest: the stream may begin before
+        # targets are where the axes come to rest, because the stream may begin before they do
         speed = setpoint.velocity_rad_s
         braked = 0.5 * speed * np.abs(speed) / self._model.acceleration_rad_s2
         self._target[:] = setpoint.position_rad + braked
@@ -67,16 +68,16 @@ class FollowProgram(AxisProgram):
 
     @property
     def stream_age_s(self) -> float:
-        """Return the age of the newest sample that it follows, nan before the first."""
+        """Return the age of the newest sample of the stream, nan before the first."""
         return self.stream.age_s
 
     @property
     def stream_buttons(self) -> int:
-        """Return the buttons of the sample that is played."""
+        """Return the buttons of the present sample."""
         return self.stream.buttons
 
     def progress(self) -> dict[str, Any]:
-        """Return the stream's state and how many samples were accepted or rejected."""
+        """Return the stream's state and the numbers of samples accepted and rejected."""
         stream = self.stream
         return {
             "stream": stream.state.name.lower(),
@@ -100,7 +101,7 @@ class FollowProgram(AxisProgram):
         return False
 
     def _follow(self, position_rad: FloatArray, scale: float) -> None:
-        """Move the targets as the stream has moved, times `scale`."""
+        """Move the targets by the motion of the stream, multiplied by `scale`."""
         model = self._model
         _lead(
             scale, self.stream.pose, self._last, model.cable_m_per_rad, model.speed_rad_s,

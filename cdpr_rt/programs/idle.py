@@ -32,7 +32,7 @@ def _track_axes(
 class IdleProgram(Program):
     """Fades the torque out; the set-point tracks the axes' angles and filtered speeds.
 
-    The next program thus begins at the speed at which an axis turns.
+    So the next program begins at the present speed of each axis.
     """
 
     name = "idle"
@@ -75,9 +75,9 @@ class IdleProgram(Program):
 
 
 class ZeroTorqueProgram(Program):
-    """Commands zero torque from its first cycle on; for bare rotors, and cables made fast.
+    """Commands zero torque from its first cycle on; for rotors without load, and cables made fast.
 
-    It serves as `idle`, and as `hold` if there is nothing to hold.
+    It is used as `idle`, and as `hold` if there is nothing to hold.
     """
 
     name = "idle"
@@ -87,10 +87,10 @@ class ZeroTorqueProgram(Program):
         self.controller: Controller = Idle(n)
 
     def start(self, _feedback: AxisFeedback, _setpoint: Setpoint, _torque_Nm: FloatArray) -> None:
-        """Take over nothing."""
+        """Do nothing: the program continues neither set-point nor torque."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Write no torques (n,), and the axes' own angles as the set-point."""
+        """Write zero torques (n,), and the angles of the axes as the set-point."""
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self.controller.update(feedback, setpoint, torque_Nm)

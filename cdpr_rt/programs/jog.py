@@ -26,11 +26,11 @@ _Jog = tuple[FloatArray, float, float]
 
 
 class JogProgram(AxisProgram):
-    """Turns the axes at commanded speeds; brakes when the command is not renewed in time.
+    """Turns the axes at commanded speeds; brakes if the command is not renewed in time.
 
-    With `duration_s` it also brakes after that total time: from standstill an axis has then turned
-    by speed times duration, since braking takes as long as accelerating.
-    Time is counted in cycles: one period per call of `update`.
+    With `duration_s` it also brakes after that total time. From standstill, an axis then turns by
+    speed times duration in total, because braking takes as long as accelerating. Time is counted in
+    cycles: one period per call of `update`.
     """
 
     name = "jog"
@@ -49,7 +49,7 @@ class JogProgram(AxisProgram):
         self._duration = math.inf
 
     def progress(self) -> dict[str, Any]:
-        """Return the commanded speeds, how long they last without renewal, and `done`.
+        """Return the commanded speeds, the time for which they last without renewal, and `done`.
 
         `done` is the elapsed share of the duration, if one was given.
         """

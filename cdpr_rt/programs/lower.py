@@ -1,4 +1,4 @@
-"""Program `lower`: lower a platform until it rests."""
+"""Program `lower`: lower a platform until it stands."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from cdpr_rt.programs.platform_program import Arrival, PlatformParts, PlatformPr
 HOME_SPEED_m_s = 0.25
 """Speed at which the platform returns to its stand; its rotation is limited in proportion."""
 SET_DOWN_m_s = 0.02
-"""Speed at which the cables set it down there."""
+"""Speed at which the cables set the platform down on its stand."""
 _ARRIVED_m, _ARRIVED_S, _ARRIVING_S = 0.01, 0.25, 2.0
 _LATE = 1.5
-"""Time allowed for the way home, over the time that it should take."""
+"""Time allowed for the way home, as a multiple of the expected time."""
 _FASTEST = 1.5
 _LIGHT = 0.2
 _SPARE_HOME_m = 0.01
-"""Cable paid out at home in addition to what the stand needs."""
+"""Cable paid out at home in addition to the length that reaches the stand."""
 _STILL_m = 0.001
 _RUNNING_IN_m_s = 0.02
 _STILL_S = 1.0
 _FADE_S = 0.2
 _MOST_S = 30.0
-"""Time for setting down, in addition to that for the distance at `UNKNOWN_POSE_m_s`."""
+"""Time for setting down, in addition to the time for the distance at `UNKNOWN_POSE_m_s`."""
 
 
 def lowering_s(platform: Platform) -> float:
@@ -73,14 +73,15 @@ def _reach_m(platform: Platform) -> float:
 class LowerProgram(PlatformProgram):
     """Returns the platform to its stand and slackens the cables there.
 
-    With slack cables or the argument `blind`, for a pose that may be wrong, no measured pose is
-    used: every winch pays out at a limited speed and limited tension, and the platform sinks.
+    With slack cables, or with the argument `blind` if the pose may be wrong, the program uses no
+    measured pose: every winch pays out at a limited speed and limited tension, and the platform
+    sinks.
 
     A small tension does not prove that a platform stands: friction of the winches may hold it. So
-    each winch pays out what its cable needs to reach the stand from the last set-point, against its
-    friction if necessary. A winch that a push beyond that friction does not turn ignores commands,
-    or holds its cable without power too. The program ends when the torque has faded out and then no
-    cable has run out for a second.
+    each winch pays out the length that its cable needs to reach the stand from the last set-point,
+    against friction if necessary. If a push greater than the friction does not turn a winch, the
+    winch ignores commands, or its cable also holds without power. The program ends when the torque
+    has faded out and no cable has then run out for a second.
     """
 
     name = "lower"
@@ -117,13 +118,13 @@ class LowerProgram(PlatformProgram):
         self._velocity = parts.estimator.estimate.velocity_rad_s
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the present set-point and torque, (n,) each."""
+        """Continue from the present set-point and torque, (n,) each."""
         self._cycles = self._still = 0
         self._was_tight = self._parts.tight
         self._without_pose = not self._was_tight
         self._trouble = ""
-        self._winches.left_m[:] = 0.0  # from a lowering that was interrupted
-        # slack cables stay as loose as they are
+        self._winches.left_m[:] = 0.0  # may remain from a lowering that was interrupted
+        # slack cables keep their slack
         self._drum_tension_N[:] = 0.0 if self._without_pose else DRUM_TENSION_SHARE * self._least
         self._stage = "home"
         if self._parts.tight:
@@ -159,11 +160,11 @@ class LowerProgram(PlatformProgram):
             torque_Nm[:] = 0.0
 
     def stop(self) -> None:
-        """Continue: lowering is the quickest stop; it is at rest when the platform stands."""
+        """Continue, because lowering is the quickest stop; it ends when the platform stands."""
         self._control.stand_in()
 
     def progress(self) -> dict[str, Any]:
-        """Return the stage, tensions, whether the cables were tight, the end, and trouble."""
+        """Return the stage, tensions, whether the cables were tight, the outcome, and problems."""
         state = {
             "stage": self._stage,
             "blind": self._without_pose,
@@ -193,16 +194,16 @@ class LowerProgram(PlatformProgram):
         return np.asarray(np.maximum(known_N, self._control.pull_fit.taken_up_N))
 
     def _largest_stretch_m(self) -> FloatArray:
-        """Return how far the highest tensions stretch the cables at home, (n,)."""
+        """Return the stretch (n,) of the cables at home under the highest tensions."""
         high_N, at_home_m = self._parts.model.high_N, self._control.lengths_at_home
         stretch_m = at_home_m(self._least) - at_home_m(high_N)
         return np.asarray(stretch_m * high_N / (high_N - self._least))
 
     def _need(self, spare_m: float) -> None:
-        """Set the length each cable needs from the set-point to the stand, plus `spare_m`.
+        """Set the length to pay out for each cable from the set-point to the stand, plus `spare_m`.
 
-        The platform was not farther away than the set-point, which a jump of an encoder does not
-        affect.
+        The set-point is used because a jump of an encoder does not change it, and the platform was
+        not farther from the stand.
         """
         self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
         here_m = self._parts.model.kinematics.lengths(self._there)
@@ -211,8 +212,9 @@ class LowerProgram(PlatformProgram):
     def _carry_weight(self, torque_Nm: FloatArray) -> None:
         """Begin with the tensions that carry the weight at `_there`, without pretension.
 
-        Pretension would fling the platform if one of the cables has broken. So would tensions for
-        the estimated pose, which follows a cable that is wound in fast, or an encoder that jumps.
+        Pretension would fling the platform if a cable has broken. Tensions for the estimated pose
+        could do the same, because this pose follows a cable that is wound in fast, or an encoder
+        that jumps.
         """
         kinematics = self._parts.model.kinematics
         kinematics.wrench_matrix(self._there, self._W)
@@ -243,7 +245,7 @@ class LowerProgram(PlatformProgram):
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         winches, period_s = self._winches, self._parts.period_s
         low_N = winches.low_N
-        # a cable that is wound in fast carries nothing, even if its winch trembles: it may be
+        # a cable that is wound in fast carries nothing, even if its winch oscillates: it may be
         # broken
         running_in = self._cable * winches.speed_rad_s < -_RUNNING_IN_m_s
         bottom_N = np.where(winches.left_m > 0.0, -winches.push_N, low_N)

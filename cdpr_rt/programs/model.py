@@ -15,18 +15,19 @@ from cdpr_rt.control.tuning import PidDesign, standstill_gains, stiffest_pid, sw
 from cdpr_rt.core.supervisor import Limits
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-"""Bandwidths that are tried for the position loops, the stiffest first."""
+"""Bandwidths tried for the position loops, the highest first."""
 CABLE_ACCELERATION_M_S2 = 1.0
 """Acceleration of cable set-points."""
 SETPOINT_SPEED_SHARE = 0.8
-"""Fastest set-point over the supervisor's speed limit, because axes overshoot set-points."""
+"""Highest set-point speed, as a share of the supervisor's limit, because axes overshoot."""
 FOLLOWING_SHARE = 0.2
-"""Rate of the quicker integral of a following axis over kp/kd, the corner of its loop."""
+"""Rate of the faster integral of an axis that follows a set-point, as a share of kp/kd, the corner
+frequency of its loop."""
 
 
 @dataclass(frozen=True)
 class AxesModel:
-    """Bounds and gains of a robot's axes as arrays (n,), on the motor side, and common values."""
+    """Bounds and gains of a robot's axes as arrays (n,) on the motor side, and common values."""
 
     period_s: float
     torque_Nm: FloatArray
@@ -51,10 +52,10 @@ class AxesModel:
 
 
 def position_loop(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidDesign:
-    """Return the position loop of a bare rotor; raises TuningError.
+    """Return the position loop of a rotor without load; raises TuningError.
 
-    The margins are those of an axis at rest. While it follows a set-point its integral is
-    quicker by `FOLLOWING_SHARE`.
+    The margins are those of an axis at rest. While the axis follows a set-point, the integral is
+    faster, see `FOLLOWING_SHARE`.
     """
     design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
     firm = standstill_gains(design, period_s)
@@ -70,11 +71,12 @@ def model_of(
     limits: Limits,
     compensation: Sequence[AxisCompensation | None] = (),
 ) -> AxesModel:
-    """Return the model of axes whose loops are as stiff as the latency of each allows.
+    """Return the model of axes whose loops are as stiff as the latency of each axis allows.
 
-    `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
-    torque acts; `compensation` (n,), or empty, is what is known of each motor. The loops are those
-    of the bare rotors. Raises TuningError if a latency is too long for any loop.
+    `latency_s` (n,) is the time from the sampling of an angle to the middle of the cycle in which
+    the resulting torque acts. `compensation` (n,), or empty, is the known cogging and friction of
+    each motor. Loops are designed for rotors without load. Raises TuningError if a latency is too
+    long for any loop.
     """
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]

@@ -1,4 +1,4 @@
-"""Programs that users write: a platform's target over time."""
+"""User-written programs: a platform's target as a function of time."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ _BEHIND_m: Final = 0.02
 
 
 class Program(ABC):
-    """A motion of the platform of your own: derive from it, give it a name and write `target`.
+    """Base class of user-written motions of the platform: subclasses set `name` and write `target`.
 
     A position (d,) has one entry for each controlled direction: the coordinates of the platform's
-    origin, m, then the rotation vector from the orientation at home, rad. k are the coordinates.
+    origin, m, then the rotation vector from the orientation at home, rad. k is the number of
+    coordinates.
     """
 
     name: str
@@ -41,7 +42,7 @@ class Program(ABC):
     """Arguments of commands: the least and the largest allowed value, and the default."""
 
     def begin(self, position: FloatArray, **arguments: float) -> None:  # noqa: B027  # optional
-        """Begin a run with the platform at a position (d,), with all arguments.
+        """Begin a run with the platform at a position (d,); all arguments are given.
 
         Each run has its own copy of the program. If this raises, the command is rejected.
         """
@@ -50,9 +51,9 @@ class Program(ABC):
     def target(self, time_s: float) -> ArrayLike | None:
         """Return the target at a time from 0, (k,) or (d,); None if the run is over.
 
-        The platform first moves to the target at time 0. Its set-point follows within the limits of
-        speed and acceleration; time waits if the target is too fast. It has to take less than a
-        cycle.
+        The platform first moves to the target of time 0. Its set-point then follows the target
+        within the limits of speed and acceleration. If the target is too fast, time stops until the
+        set-point has caught up. A call has to take less than a cycle.
         """
 
 
@@ -65,7 +66,7 @@ class _Command:
 class OwnProgram(PoseProgram):
     """Moves the platform along the target of a user's `Program`.
 
-    If the target fails or leaves the workspace, the platform brakes and is held.
+    If `target` raises or leaves the workspace, the platform brakes and holds.
     """
 
     def __init__(
@@ -78,12 +79,12 @@ class OwnProgram(PoseProgram):
         self._most_behind_m = _BEHIND_m + float(parts.speed[0] ** 2 / parts.acceleration[0])
 
     def start(self, *given: Any) -> None:
-        """Go on from the present set-point and torque; brakes until a run begins."""
+        """Continue from the present set-point and torque; brake until a run begins."""
         super().start(*given)
         self._runs, self._time_s, self._failure = False, -1.0, ""
 
     def described(self) -> dict[str, Any]:
-        """Return its purpose, and the bounds of its arguments, for clients."""
+        """Return the purpose of the program and the bounds of its arguments, for clients."""
         text = (inspect.getdoc(self._own) or "").partition("\n")[0]
         bounds = {
             key: {"low": float(low), "high": float(high), "default": float(default)}
@@ -96,7 +97,7 @@ class OwnProgram(PoseProgram):
         return self._runs and self._time_s >= 0.0
 
     def progress(self) -> dict[str, Any]:
-        """Return the platform's state, the time of the run, and why it was ended."""
+        """Return the platform's state, the time of the run, and the reason why it was ended."""
         state = {**super().progress(), "time_s": max(self._time_s, 0.0)}
         if self._failure:
             state |= {"trouble": self._failure, "done": 0.0}
@@ -115,7 +116,7 @@ class OwnProgram(PoseProgram):
         try:
             run.begin(start.copy(), **values)
             first = self._position_of(run.target(0.0), start)
-        except (Exception, SystemExit) as error:  # whatever the code there does
+        except (Exception, SystemExit) as error:  # the user's code may raise anything
             raise ProgramError(f"{self.name}: {type(error).__name__}: {error}") from error
         if first is None:
             raise ProgramError(f"{self.name}: it has no target at time 0")
@@ -156,10 +157,10 @@ class OwnProgram(PoseProgram):
         return False
 
     def _take_target(self) -> None:
-        """Take the target of this cycle as the goal, or end the run."""
+        """Use the target of this cycle as the goal, or end the run."""
         try:
             goal = self._position_of(self._run.target(self._time_s), self._goal)
-        except (Exception, SystemExit) as error:  # it must not end the loop's process
+        except (Exception, SystemExit) as error:  # user code must not end the loop's process
             self._end(f"at {self._time_s:.3f} s: {type(error).__name__}: {error}")
             return
         if goal is None:
@@ -171,7 +172,7 @@ class OwnProgram(PoseProgram):
             self._goal[:] = self._examined_goal[:] = goal
 
     def _why_not(self, goal: FloatArray) -> str:
-        """Return why the platform cannot be at a target (d,), "" if it can."""
+        """Return the reason why the platform cannot be at a target (d,), or ""."""
         control = self._control
         if beyond := self._beyond_box(goal) or self._beyond_angle(goal):
             return beyond
@@ -181,14 +182,14 @@ class OwnProgram(PoseProgram):
         return control.contact(pair) if pair >= 0 else ""
 
     def _end(self, why: str) -> None:
-        """End the run before its end; the platform brakes."""
+        """Abort the run; the platform brakes."""
         self._runs, self._failure = False, why
         self._stop_straight()
         self._target[:] = self._rest
         self._acceleration[:] = self._stopping_acceleration
 
     def _position_of(self, target: Any, before: FloatArray) -> FloatArray | None:
-        """Return a target as a position (d,), with the rotation of `before` if it has none."""
+        """Return a target as a position (d,); if it has no rotation, it gets that of `before`."""
         if target is None:
             return None
         given = np.asarray(target, float)
@@ -202,9 +203,9 @@ class OwnProgram(PoseProgram):
 
 
 def checked_programs(found: Iterable[tuple[str, Any]], taken: Iterable[str]) -> list[Program]:
-    """Return loaded programs after a check of their names and arguments.
+    """Check the names and arguments of loaded programs; return the programs by name.
 
-    `found` are pairs of a reference and what it names, `taken` the names of built-in programs.
+    `found` are pairs of a reference and the loaded object, `taken` the names of built-in programs.
     Raises CodeError that begins with the reference.
     """
     names, programs = set(taken), list[Program]()

@@ -40,15 +40,15 @@ class _Command:
     """Time in the plan to step back to."""
     feed: float
     on_way: bool = False
-    """Whether the way there has been checked."""
+    """Whether the way to that time of the plan has been checked."""
 
 
 class PathProgram(PlatformProgram):
-    """Plays a plan from its beginning or where it was left, after a straight line to that place.
+    """Plays a plan from its beginning or from where it was left, after a straight way to there.
 
     A plan is read and checked against the robot's limits before the command is accepted. The feed
-    slows down the time along the plan, so the set-point stays on the path however the feed changes.
-    It also stays there in every stop of this program, and in `hold` after it.
+    scales the time along the plan, so the set-point stays on the path for every change of the feed.
+    It also stays on the path in every stop of this program, and in the program `hold` afterwards.
     """
 
     name = "path"
@@ -65,13 +65,13 @@ class PathProgram(PlatformProgram):
         self._goal = self._feed = 0.0
         self._paused = ""
         self._last_cycle = -2
-        # compiled here, not when a path begins
+        # this call compiles the kernel before a path begins
         self._samples[:, 0] = parts.model.home
         self._samples.flags.writeable = False
         self._play(0.0)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Continue from the last set-point; if it is on the path, it stays there."""
+        """Continue from the last set-point; if this is on the path, it stays on the path."""
         if self.is_on_path(feedback.cycle):
             self._stopping = self._at_rest = False
             self._arrival.restart()
@@ -87,7 +87,7 @@ class PathProgram(PlatformProgram):
         super().update(feedback, setpoint, torque_Nm)
 
     def is_on_path(self, cycle: int) -> bool:
-        """Whether it has moved the set-point up to a cycle, and that set-point is on the path."""
+        """Whether this program moved the set-point up to this cycle, and it is on the path."""
         return self._stage == "path" and cycle - self._last_cycle in (0, 1)
 
     def left(self) -> dict[str, Any] | None:
@@ -158,12 +158,12 @@ class PathProgram(PlatformProgram):
         return _Command(key, plan, time_s, back_s, feed, on_way)
 
     def _follows(self, plan: StoredPlan) -> bool:
-        """Return whether the set-point is on this plan and nothing else has moved it."""
+        """Return whether the set-point is on this plan and no other program has moved it."""
         known = self._plan is not None and self._plan.name == plan.name
         return known and self._stage == "path" and self._last_cycle == self._parts.cycle
 
     def _taken_up(self, key: str) -> tuple[StoredPlan, float]:
-        """Return the interrupted plan, and the time up to which it was followed."""
+        """Return the interrupted plan and the time up to which it was followed."""
         left = self.store.unfinished
         if left is None:
             nothing = {"left": "path", "instead": "plan"}
@@ -178,7 +178,7 @@ class PathProgram(PlatformProgram):
         return plan, min(max(time_s, 0.0), plan.duration_s)
 
     def _require_way(self, plan: StoredPlan, time_s: float) -> None:
-        """Raise ProgramError if the straight way to a place of the plan is not feasible."""
+        """Raise ProgramError if the straight way to the position at a time is not feasible."""
         control, begin = self._control, np.array(plan.samples[plan.row(time_s), 0])
         acceleration, stop = np.zeros((2, begin.size))
         along_velocity(control.velocity, self._parts.acceleration, acceleration)
@@ -199,12 +199,12 @@ class PathProgram(PlatformProgram):
                 self._stage = "set out"
             return
         plan = command.plan
-        assert plan is not None  # all other commands have one
+        assert plan is not None  # all other commands have a plan
         self._paused = "stepping back" if command.what == "back_m" else ""
         if self._stage == "path" and command.what != "plan":
             self._goal = command.back_s if command.what == "back_m" else self._next_stop(plan)
             return
-        if not command.on_way:  # something has moved the platform off the path
+        if not command.on_way:  # another program has moved the platform off the path
             self._require_way(plan, command.begins_s)
         self._plan, self._samples, self._period_s = plan, plan.samples, plan.period_s
         self._state[playback.TIME], self._state[playback.RATE] = command.begins_s, 0.0
@@ -214,7 +214,7 @@ class PathProgram(PlatformProgram):
         self._goal = command.back_s if command.what == "back_m" else self._next_stop(plan)
 
     def _next_stop(self, plan: StoredPlan) -> float:
-        """Return the time at which the plan next waits, or ends."""
+        """Return the time of the next wait of the plan, or of its end."""
         time_s = self._state[playback.TIME]
         waits = plan.waits_s[plan.waits_s > time_s + 0.5 * plan.period_s]
         return float(waits[0]) if waits.size else plan.duration_s
@@ -233,7 +233,7 @@ class PathProgram(PlatformProgram):
         return at_rest and not self._stage
 
     def _set_out(self) -> None:
-        """Begin the straight way to the place where the path begins or resumes."""
+        """Begin the straight way to the position at which the path begins or resumes."""
         control = self._control
         self._play(0.0)
         self._target[:] = self._setpoint[0]
@@ -280,7 +280,7 @@ class PathProgram(PlatformProgram):
         self.store.mark_progress(self._state[playback.TIME])
 
     def _approach(self) -> bool:
-        """Come to rest, on the path if the set-point is on it."""
+        """Bring the set-point to rest, on the path if it is on it."""
         if self._stage != "path":
             return super()._approach()
         at_rest = self._play(0.0)

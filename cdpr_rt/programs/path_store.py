@@ -1,8 +1,8 @@
-"""Planned paths as files that the loop reads, and the progress on the last one.
+"""Planned paths in files that the loop reads, and the progress along the last path.
 
-The planner writes a plan once, under a name that is a digest of its content. When it is commanded,
-another thread reads it into memory and checks it against the robot's limits. The loop writes its
-progress into memory that outlives it; `keep_progress` copies that to the disk.
+The planner writes a plan once, in a file named by a digest of the content. When a command requests
+the plan, another thread reads it into memory and checks it against the robot's limits. The loop
+writes its progress into memory that outlives the loop, and `keep_progress` copies it to the disk.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from cdpr_rt.motion.path.time_scaling import PERIOD_S, TimedPath, quintic
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.state_file import FILE_MODE, make_private_folder, state_path
 
-# Progress of a robot on its last path, on the disk: written by the service, not the loop.
+# Progress of a robot along its last path, on the disk: written by the service, not by the loop.
 
 _EVERY_S: Final = 0.5
 _LOOKS: Final = 3
 
 
 def paths_folder(robot: str) -> Path:
-    """Return the folder of the plans for a robot's profile, and of the progress on the last one."""
+    """Return the folder of a robot's plans, which also has the progress along the last one."""
     return state_path("paths", robot).with_suffix("")
 
 
 def progress_file(folder: Path, *, simulated: bool = False) -> Path:
-    """Return the file of the progress on the last path, real or simulated."""
+    """Return the file with the progress along the last path, real or simulated."""
     return folder / ("progress.simulated" if simulated else "progress")
 
 
@@ -71,9 +71,9 @@ def write_progress(folder: Path, row: NDArray[Any], *, simulated: bool = False) 
 async def keep_progress(folder: Path, live: NDArray[Any], *, simulated: bool = False) -> None:
     """Keep a copy on the disk of a `PATH` row that the loop writes, until cancelled.
 
-    While the disk is full, the old copy stays; the path is followed all the same.
+    While the disk is full, the old copy stays and the robot still follows the path.
     """
-    # imported here: only the daemon, which has loaded it, keeps progress
+    # imported here because only the daemon, which loads asyncio anyway, keeps progress
     import asyncio  # noqa: PLC0415
 
     kept = b""
@@ -91,7 +91,7 @@ async def keep_progress(folder: Path, live: NDArray[Any], *, simulated: bool = F
 
 
 def _settled(live: NDArray[Any]) -> NDArray[Any] | None:
-    """Return a copy of a row; None while the loop is writing another path into it."""
+    """Return a copy of a row, or None while the loop is writing another path into it."""
     for _ in range(_LOOKS):
         row = live.copy()
         if (row[["name", "over"]] == live[["name", "over"]]).all():
@@ -154,9 +154,10 @@ def play(
 ) -> bool:
     """Move one cycle along the plan towards the time `goal`; return whether it rests there.
 
-    `wanted` is the rate, at least 0; at 0 it comes to rest wherever it is. The rate changes as fast
-    as `acceleration` (d,) allows in addition to that of the path, or at a quarter of it if the path
-    takes all. Forward goals are rests of the plan. `setpoint` (3, d) is written.
+    `wanted` is the rate, at least 0; if it is 0, the set-point comes to rest at any time of the
+    plan. The rate changes with the part of `acceleration` (d,) that the path leaves, or with a
+    quarter of `acceleration` if the path needs all of it. A goal later than the present time must
+    be a rest of the plan. `setpoint` (3, d) is written.
     """
     time, rate = state[TIME], state[RATE]
     _place(samples, period, time, scratch)
@@ -202,7 +203,7 @@ def _keeps_between(
     acceleration: float,
     jerk: float,
 ) -> bool:
-    """Return whether a coordinate keeps its speed and acceleration limits between two samples."""
+    """Return whether a coordinate keeps within speed and acceleration limits between samples."""
     more = min(0.5 * period * jerk, acceleration)
     for j in range(1, 4):
         _, v, a, _ = _between(samples, period, i, k, 0.25 * j)
@@ -228,15 +229,16 @@ def first_fault_of(
 ) -> int:
     """Return the first sample from `begin` to `end` that is out of limits, or jumps; -1 for none.
 
-    `low` and `high` (k,) bound the positions, `angle` the length of the remaining entries. Between
-    samples the acceleration may be larger by the jerk times half a period, up to double.
+    `low` and `high` (k,) bound the coordinates, `angle` the length of the rotation vector. Between
+    samples the acceleration may exceed its limit by the jerk times half a period, but at most by a
+    factor of 2.
     """
     last = samples.shape[0] - 1
     for i in range(begin, min(end, last + 1)):
         turned = 0.0
         for k in range(samples.shape[2]):
             q, v, a = samples[i, 0, k], samples[i, 1, k], samples[i, 2, k]
-            # nan fails all of these
+            # nan fails all of these comparisons
             if not (abs(v) <= _MORE * speed[k] and abs(a) <= _MORE * acceleration[k]):
                 return i
             if k < low.size:
@@ -257,19 +259,21 @@ def first_fault_of(
     return -1
 
 
-# Whether a plan's samples keep a robot's limits and are feasible; for a thread beside the loop's.
+# Check of a plan's samples against the robot's limits and the cables, outside the loop's thread.
 
 _AT_ONCE: Final = 100
-"""Samples checked in one call: the loop's thread cannot run while a kernel does."""
+"""Number of samples checked in one call; it is limited because the loop's thread cannot run during
+a kernel."""
 _HELD_EVERY: Final = 20
-"""One in so many samples is checked for whether the cables hold it."""
+"""One in this number of samples is checked for feasible tensions."""
 _HELD_AT_ONCE: Final = 10
 
 
 def first_fault(model: PlatformModel, samples: FloatArray, period_s: float) -> int:
     """Return the first of the samples (c, 3, d) that breaks the robot's limits, -1 for none.
 
-    Checks position, speed and acceleration at and between samples, then whether cables hold it.
+    It checks position, speed and acceleration at and between samples, then whether the cables hold
+    the platform.
     """
     platform = model.platform
     low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
@@ -312,7 +316,7 @@ class StoredPlan:
     line: NDArray[np.int64]
     """Lines of the path's file, (c,)."""
     waits_s: FloatArray
-    """Times at which it waits."""
+    """Times at which the path waits."""
 
     @property
     def duration_s(self) -> float:
@@ -324,12 +328,12 @@ class StoredPlan:
         return min(max(int(time_s / self.period_s + 1e-6), 0), len(self.samples) - 1)
 
     def row_along(self, along_m: float) -> int:
-        """Return the first sample at least so far along the path, or the last one."""
+        """Return the first sample at least `along_m` along the path, or the last sample."""
         return min(int(np.searchsorted(self.along_m, along_m)), len(self.samples) - 1)
 
 
 def robot_key(model: PlatformModel) -> str:
-    """Return a text that changes with the robot, its file and its motors."""
+    """Return a text that identifies the robot, its file and its motors."""
     bounds = (model.low_N, model.high_N, model.torque_limited_N)
     key_text = repr((model.platform, *(bound.tolist() for bound in bounds)))
     return hashlib.sha256(key_text.encode()).hexdigest()[:32]
@@ -338,7 +342,7 @@ def robot_key(model: PlatformModel) -> str:
 def write_plan(
     folder: Path, timed: TimedPath, lines: NDArray[np.int64], title: str, model: PlatformModel
 ) -> str:
-    """Write a plan into a folder, which keeps the newest few; return its name.
+    """Write a plan into a folder, which keeps the newest plans only; return the name of the plan.
 
     `lines` (c,) are the lines of the samples in the path's file. Raises ProgramError.
     """
@@ -409,14 +413,14 @@ def _parsed_plan(name: str, data: bytes, d: int) -> tuple[StoredPlan, Any]:
         or (np.diff(row) <= 0).any()
         or samples[row.astype(np.int64), 1:].any()
     ):
-        raise ValueError  # it would wait while moving
+        raise ValueError  # the path would wait while it moves
     title = str(head["title"])
     plan = StoredPlan(name, title, PERIOD_S, samples, arrays[1], arrays[2], waits_s)
     return plan, head.get("robot")
 
 
 class PathStore:
-    """The plans of one robot in a folder, and the progress on the last one."""
+    """The plans of one robot in a folder, and the progress along the last one."""
 
     def __init__(self, model: PlatformModel) -> None:
         self._model = model
@@ -428,7 +432,7 @@ class PathStore:
     def open(
         self, folder: Path, progress: NDArray[Any] | None = None, *, simulated: bool = False
     ) -> None:
-        """Take plans from a folder, and write progress to `progress`, a `PATH` row.
+        """Use plans from a folder, and write progress to `progress`, a `PATH` row.
 
         An empty row is filled from the folder. Raises ProgramError if plans cannot be written
         there.
@@ -444,7 +448,7 @@ class PathStore:
             self._progress[:] = read_progress(folder, simulated=simulated)
 
     def load(self, name: str) -> None:
-        """Read a plan and check it against the robot's limits; not for the loop's thread.
+        """Read a plan and check it against the robot's limits; must not run in the loop's thread.
 
         Raises ProgramError if the plan is missing, for another robot, or violates the limits.
         """
@@ -474,7 +478,7 @@ class PathStore:
                 f"path: {plan.title}: breaks the robot's limits at line {int(plan.line[bad])}: "
                 "plan it again"
             )
-        # keep the previous plan, so that its memory is not freed in the loop's thread
+        # keep the previous plan, because its memory must not be freed in the loop's thread
         self._ready = (plan, *self._ready[:1])
 
     def is_loaded(self, name: str) -> bool:
@@ -482,17 +486,17 @@ class PathStore:
         return any(plan.name == name for plan in self._ready)
 
     def plan(self, name: str) -> StoredPlan:
-        """Return a plan that has been loaded; raises ProgramError for another."""
+        """Return a loaded plan; raises ProgramError if it has not been loaded."""
         for plan in self._ready:
             if plan.name == name:
                 return plan
         raise ProgramError(f"path: plan: value {name[:40]!r}: has not been loaded")
 
-    # -- how far it has come
+    # -- progress along a plan
 
     @property
     def unfinished(self) -> tuple[str, float] | None:
-        """Name of the plan that was not finished, and the time up to which it came; or None."""
+        """Name of the unfinished plan and the time up to which it was followed; or None."""
         row = self._progress[0]
         name = bytes(row["name"]).decode("ascii", "replace")
         if row["over"] or not name or not np.isfinite(row["time_s"]):
@@ -500,8 +504,10 @@ class PathStore:
         return name, float(row["time_s"])
 
     def mark_begun(self, name: str, time_s: float) -> None:
-        """Record that a plan is followed from a time on."""
-        self._progress["over"] = 1  # first: the row is valid even after a kill in between
+        """Record that the robot follows a plan from this time on."""
+        self._progress["over"] = (
+            1  # written first, so that the row is valid even if the process is killed in between
+        )
         self._progress["name"], self._progress["time_s"] = name.encode(), time_s
         self._progress["over"] = 0
 

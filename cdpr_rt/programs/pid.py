@@ -1,4 +1,4 @@
-"""Program `pid`: go to positions under the position loop."""
+"""Program `pid`: move axes to positions with the position loop."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Target = tuple[str, FloatArray, FloatArray]
 
 
 class PidProgram(AxisProgram):
-    """Moves the axes to positions on a trapezoidal profile that is recomputed every cycle."""
+    """Moves the axes to positions with a trapezoidal profile that is computed again every cycle."""
 
     name = "pid"
     needs_lease = True
@@ -38,7 +38,7 @@ class PidProgram(AxisProgram):
         self._has_target = False
 
     def progress(self) -> dict[str, Any]:
-        """Return the target and the share of the distance that has been covered."""
+        """Return the target and the share of the distance covered."""
         done = self._motion.part_done(self._setpoint)
         return {"target_rad": self._motion.target_rad.tolist(), "done": done}
 

@@ -22,7 +22,7 @@ from cdpr_rt.programs.standing import hangs
 class PlatformHold(Program):
     """Brakes and holds the platform, or each axis alone if the cables are slack.
 
-    A set-point on a path stays on it.
+    A set-point that is on a path stays on it.
     """
 
     name = "hold"
@@ -71,7 +71,7 @@ class PlatformHold(Program):
         return self._active.pose_setpoint
 
     def progress(self) -> dict[str, Any]:
-        """Return whether the platform or the axes are held, and where."""
+        """Return whether the program holds the platform or single axes, and the position."""
         parts = self._parts
         progress = {"tight": parts.tight, **self._active.progress()}
         left = self._path.left()
@@ -79,19 +79,19 @@ class PlatformHold(Program):
 
 
 class PlatformIdle(IdleProgram):
-    """Fades the torque out; refused while the platform hangs on its cables."""
+    """Fades the torque out; the command is rejected while the platform hangs on its cables."""
 
     def __init__(self, parts: PlatformParts, model: AxesModel) -> None:
         super().__init__(model)
         self._parts = parts
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Continue from the last set-point and torque; the cables count as slack."""
+        """Continue from the last set-point and torque; mark the cables as slack."""
         self._parts.slacken()
         super().start(feedback, setpoint, torque_Nm)
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Raise ProgramError for any argument, or if the platform would fall."""
+        """Raise ProgramError if there is an argument, or if the platform would fall."""
         super().check(arguments)
         if self._parts.tight:
             raise ProgramError("idle: the platform hangs on its cables; lower it first")
@@ -104,15 +104,16 @@ class PlatformIdle(IdleProgram):
 
 
 class PlatformJog(JogProgram):
-    """Turns single winches; the cables count as slack from then on."""
+    """Turns single winches; marks the cables as slack."""
 
     def __init__(self, parts: PlatformParts, model: AxesModel, loop: BumplessController) -> None:
         super().__init__(model, loop)
         self._parts = parts
 
     def check(self, arguments: Mapping[str, Any]) -> Any:
-        """Return checked arguments for `apply`; raises ProgramError, also for a platform on its
-        cables."""
+        """Return checked arguments for `apply`; raises ProgramError, also if cables carry the
+        platform.
+        """
         if self._parts.tight:
             raise ProgramError("jog: the platform hangs on its cables; lower it first")
         return super().check(arguments)

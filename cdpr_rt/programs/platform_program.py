@@ -1,4 +1,4 @@
-"""Base class of the programs that move a platform, and what they share."""
+"""Base class of the programs that move a platform, and their shared parts."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ from cdpr_rt.programs.base import BumplessTransfer, CommandedProgram, ProgramErr
 from cdpr_rt.programs.path_store import PathStore
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
-# When a platform has arrived at a set-point at rest.
+# Decision whether a platform has arrived at a set-point at rest.
 
 NEAR_m, NEAR_SHARE = 5e-4, 1e-4
-"""Within this distance a platform has arrived, unless friction keeps it farther away. On a large
-robot, whose long cables stretch and sag more: this share of the diagonal of its frame."""
+"""Distance within which a platform has arrived, unless friction keeps it farther away; and the
+share of the frame's diagonal that is used on large robots, whose long cables stretch and sag
+more."""
 _NEAR_S = 0.2
 _WAITED_S = 5.0
 
@@ -38,8 +39,8 @@ _WAITED_S = 5.0
 class Arrival:
     """Counts the cycles in which a set-point stands, and those in which the platform is near it.
 
-    It is over once the platform has been within `near_m` for `near_s`, or the set-point has stood
-    for `waited_s` without that.
+    The wait is over when the platform has been within `near_m` for `near_s`, or when the set-point
+    has stood for `waited_s`.
     """
 
     def __init__(
@@ -53,15 +54,15 @@ class Arrival:
         self._near_cycles, self._most_cycles = round(near_s / period_s), round(waited_s / period_s)
         self._near = self._standing = 0
         self.off_m = 0.0
-        """How far the platform was from its set-point in the last cycle."""
+        """Distance of the platform from its set-point in the last cycle."""
 
     def restart(self) -> None:
-        """Begin again, for a set-point that is about to move."""
+        """Begin again, because the set-point is about to move."""
         self._near = self._standing = 0
         self.off_m = 0.0
 
     def update(self, standing: bool, off_m: float) -> None:
-        """Count a cycle in which the set-point stands or not, the platform `off_m` from it."""
+        """Count a cycle: is the set-point `standing`, and how far (`off_m`) is the platform."""
         self._standing = self._standing + 1 if standing else 0
         self._near = self._near + 1 if standing and off_m < self.near_m else 0
         self.off_m = off_m
@@ -72,7 +73,7 @@ class Arrival:
         return self._near > self._near_cycles or self._standing > self._most_cycles
 
     def text(self) -> str:
-        """Return how far from the set-point the platform has stayed, "" if it has arrived."""
+        """Return as text how far the platform is from the set-point, "" if it has arrived."""
         if not self.over or self._near > self._near_cycles:
             return ""
         return f"the platform stands {1e3 * self.off_m:.1f} mm from its target"
@@ -86,7 +87,7 @@ _TOLD_DIGITS = 3
 
 @jit
 def distance_m(here: FloatArray, there: FloatArray, scale: FloatArray) -> float:
-    """Return the distance of two positions (d,), whose entries count for `scale` metres."""
+    """Return the distance of two positions (d,), m; their entries are multiplied by `scale`."""
     square = 0.0
     for i in range(scale.size):
         square += (scale[i] * (here[i] - there[i])) ** 2
@@ -95,7 +96,7 @@ def distance_m(here: FloatArray, there: FloatArray, scale: FloatArray) -> float:
 
 @jit
 def along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatArray) -> None:
-    """Write accelerations, up to `most`, that end all velocities in the same time; all are (n,)."""
+    """Write accelerations, up to `most`, that stop all velocities in the same time; (n,) each."""
     longest = 0.0
     for i in range(most.size):
         longest = max(longest, abs(velocity[i]) / most[i])
@@ -108,7 +109,7 @@ def along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatAr
 
 @jit
 def synchronise(position: FloatArray, target: FloatArray, most: FloatArray) -> None:
-    """Reduce bounds `most` (d,) of speed or acceleration so that all ways take equally long."""
+    """Reduce bounds `most` (d,) of speed or acceleration so that all directions end together."""
     longest = 0.0
     for i in range(most.size):
         longest = max(longest, abs(target[i] - position[i]) / most[i])
@@ -119,7 +120,7 @@ def synchronise(position: FloatArray, target: FloatArray, most: FloatArray) -> N
 
 
 _TOLD_APART_m = 0.005
-"""Least residual that shows whether a platform stood at home: geometry errors cause some mm."""
+"""Least residual that shows whether a platform stood at home; geometry errors cause some mm."""
 
 
 class PlatformParts:
@@ -139,7 +140,7 @@ class PlatformParts:
         self.lengths_allowed_m = lengths_disagree_m
         """Largest allowed disagreement of the cables' lengths."""
         self.home_lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
-        """The same at home, where the error of the drums has no effect."""
+        """Largest allowed disagreement at home, where errors of the drums have no effect."""
         self.names = tuple(names) or tuple(map(default_name, range(control.torque_Nm.size)))
         """Names of the cables in messages, those of their axes."""
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
@@ -156,21 +157,23 @@ class PlatformParts:
         control.measure_tensions(known.tension_N, known.tension_measured, known.upward)
         self.period_s = period_s
         self.speed, self.acceleration = model.speed, model.acceleration
-        """The most along each direction, (d,)."""
+        """Largest speed and acceleration along each direction, (d,)."""
         self.scale_m = model.wrench_scale
-        """How far an anchor point moves with each direction, (d,): 1, and for angles an arm."""
+        """Motion of an anchor point per unit of each direction, (d,): 1 for coordinates, an arm for
+        angles."""
         self.not_calibrated_reason = ""
-        """Why the geometry is unreliable, for example because a rail has moved; else empty."""
+        """Reason why the geometry is unreliable, for example that a rail has moved; else empty."""
         self.off_home = ""
-        """How far it may stand from the pose of its lengths, which were taken at home."""
+        """Text that says how far the platform may stand from the pose by its lengths, which were
+        taken at home."""
         self.off_home_by = np.zeros(model.size)
-        """Distance from home by the lengths when they were taken there, (d,); 0 if that is no cause
-        of `off_home`."""
+        """Difference (d,) from home by lengths that were taken at home; 0 if it is not the reason
+        for `off_home`."""
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False
         self.loop = BumplessTransfer(control, control.torque_Nm, period_s)
-        """The platform's control, which keeps its state from one program to the next."""
+        """The platform's control, which keeps its state from program to program."""
 
     @property
     def tight(self) -> bool:
@@ -200,10 +203,10 @@ class PlatformParts:
         return [text for text in told if text]
 
     def _shows_right_lengths(self) -> bool:
-        """Return whether the lengths agree better than they could if `off_home` were right.
+        """Return whether the lengths agree so well that `off_home` must be wrong.
 
-        Lengths taken at home while the platform stood off it by δ are J_h δ too long, and leave
-        residuals (I - J J^+) J_h δ elsewhere.
+        If the platform stood off home by δ when its lengths were taken, they are too long by J_h δ,
+        and leave residuals (I - J J^+) J_h δ elsewhere.
         """
         if not self.off_home or not self.tight or not self.off_home_by.any():
             return False
@@ -218,7 +221,7 @@ class PlatformParts:
     def lengths_disagree(self) -> tuple[float, int, float, int]:
         """Return how much the lengths disagree and the index of the worst cable; 0 while slack.
 
-        Then the largest sudden change of a length, and the index of its cable.
+        Also returns the largest sudden change of a length, and the index of that cable.
         """
         control = self.control
         if not self.tight:
@@ -226,13 +229,13 @@ class PlatformParts:
         return control.residual_m, control.suspect, control.jump_m, control.jumped
 
     def suspects_text(self) -> str:
-        """Return which cable's length is most likely wrong, as the end of a message."""
+        """Return the end of a message, which names the cable whose length is most likely wrong."""
         names = [self.names[i] for i in self.control.suspects()]
         which = "most likely that of" if len(names) == 1 else "one of"
         return f", {which} {', '.join(names)}" if names else ""
 
     def assume_at_home(self, feedback: AxisFeedback) -> None:
-        """Assume the platform at home on tight cables, for the warm-up."""
+        """Assume for the warm-up that the platform is at home on tight cables."""
         lengths_m = self.control.lengths_at_home(self.control.least_N)
         self.control.take_lengths(lengths_m, feedback)
         self.control.begin(feedback)
@@ -240,12 +243,12 @@ class PlatformParts:
         self.tight = True
 
     def slacken(self) -> None:
-        """Mark the cables as slack; a platform that they carried may have moved."""
+        """Mark the cables as slack; the platform may have moved if they carried it."""
         self.last_stop.displaced = self.last_stop.displaced or self.tight
         self.tight = False
 
     def forget(self) -> None:
-        """Forget the pose of the platform, as if it stood at home."""
+        """Discard the pose of the platform, as if it stood at home."""
         self.tight = self.last_stop.displaced = self.last_stop.fallen = False
         self.last_stop.contradicted = ""
         self.estimator.forget_lengths()
@@ -253,7 +256,7 @@ class PlatformParts:
         self.follow_origins()
 
     def follow_origins(self) -> None:
-        """Forget what was learnt about motors whose angles have a new origin."""
+        """Discard the values learnt for motors whose angles have a new origin."""
         if self._origins_lost != self.estimator.origins_lost:
             self._origins_lost = self.estimator.origins_lost
             self.control.forget_motors()
@@ -262,7 +265,7 @@ class PlatformParts:
 class PlatformProgram(CommandedProgram):
     """Brakes and holds the platform on tight cables; subclasses override `_move`.
 
-    The pose has to be known: `tighten` finds it.
+    The pose has to be known; the program `tighten` finds it.
     """
 
     name = "platform"
@@ -281,11 +284,11 @@ class PlatformProgram(CommandedProgram):
         self._directions = np.array(model.kinematics.directions)
         self._wanted, self._scratch, self._seen = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(7)
         self._arrival = Arrival(parts.period_s, parts.near_m)
-        # compiled here, not when the first pose is recorded
+        # this call compiles the kernel before the first pose is recorded
         self._write_setpoint(self._target)
 
     def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Continue from the last set-point and torque; the platform brakes and stays."""
+        """Continue from the last set-point and torque; the platform brakes and holds."""
         parts, control = self._parts, self._control
         self._stopping = False
         self._at_rest = False
@@ -316,7 +319,7 @@ class PlatformProgram(CommandedProgram):
         self._brake()
 
     def _require_pose(self) -> None:
-        """Raise ProgramError if the platform must not be moved to a pose."""
+        """Raise ProgramError if the platform must not move to a pose."""
         parts = self._parts
         if doubt := parts.not_calibrated_reason or parts.last_stop.contradicted:
             why = {"why": doubt}
@@ -343,7 +346,7 @@ class PlatformProgram(CommandedProgram):
         write_quaternion(self._wanted, self._seen)
 
     def progress(self) -> dict[str, Any]:
-        """Return position, target, tensions and why these are infeasible."""
+        """Return position, target, tensions, and the reason if these are infeasible."""
         control, k = self._control, self._k
         turned = {
             "rotation_rad": control.estimated[k:].tolist(),
@@ -365,7 +368,7 @@ class PlatformProgram(CommandedProgram):
         }
 
     def _swing_text(self) -> str:
-        """Return how far a platform that has arrived may still swing, "" for little."""
+        """Return as text how far a platform that has arrived may swing, "" if only a little."""
         swing_rad, swing_m = self._control.swing_rad, self._control.swing_m
         if not self._arrival.over or swing_m < SWINGS_m:
             return ""
@@ -375,7 +378,7 @@ class PlatformProgram(CommandedProgram):
         )
 
     def _held_back(self) -> str:
-        """Return why the set-point is slowed down, "" if it is not."""
+        """Return the reason why the set-point is slowed down, or ""."""
         lag_m = self._lag_m()
         if lag_m < _WAITING_m or not self._parts.pose_known:
             return ""
@@ -386,14 +389,14 @@ class PlatformProgram(CommandedProgram):
         return self._approach()
 
     def _lag_m(self) -> float:
-        """Return how far the platform is from its set-point, at its anchor points."""
+        """Return the distance of the platform's anchor points from their set-points."""
         control = self._control
         return distance_m(control.shaped, control.estimated, self._parts.scale_m)
 
     def _pace(self) -> FloatArray:
-        """Return the set-point's speed, reduced the more the platform lags; overwritten.
+        """Return the set-point's speed, which falls with the lag of the platform; overwritten.
 
-        If the set-point ran away from a stuck platform, a following error would result.
+        Otherwise a set-point would run away from a stuck platform and cause a following error.
         """
         share = 1.0
         if not self._stopping:
@@ -417,7 +420,7 @@ class PlatformProgram(CommandedProgram):
         self._target[:] = self._stopping_position()
 
     def _stopping_position(self) -> FloatArray:
-        """Return the position at which it comes to rest if it brakes from now on; overwritten."""
+        """Return where the set-point comes to rest if it brakes from now on; overwritten."""
         control = self._control
         stopping_position(control.position, control.velocity, self._acceleration, self._rest)
         return self._rest

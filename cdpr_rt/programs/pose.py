@@ -29,7 +29,7 @@ _DEADBAND_m = 5e-5
 _ANYWHERE_m = 1e3
 _HALF_TURN_rad = math.pi
 _BLOCKED_m = 1e-3
-"""A way is blocked if the set-point moves no farther than this on it."""
+"""A way is blocked if the set-point moves at most this far on it."""
 _HELD_BACK = {
     hand_target.FREE: "",
     hand_target.AT_EDGE: "at the edge of the workspace",
@@ -43,13 +43,13 @@ _KEYS = (*_ABSOLUTE, *_RELATIVE, "frame", "stream", "resume", "speed_m_s")
 
 
 class PoseProgram(PlatformProgram):
-    """Moves the platform to a position and rotation, or along with the set-point stream.
+    """Moves the platform to a position and rotation, or follows the set-point stream.
 
     The trapezoidal profile of Tremblay (thesis), eq. (2.10) to (2.12), is computed every cycle for
-    each direction. From rest to a target all directions take the same time, on a straight line.
-    The stream moves the target by its displacement times its scale and turns it as it turns, except
-    while the clutch is open: then the platform comes to rest and holds. No target leaves the
-    workspace, and the set-point only moves if it can still stop within it.
+    each direction. From rest to a target all directions take the same time, on a straight line. The
+    stream moves the target by its displacement times its scale, and turns it by its rotation. While
+    the clutch is open, the platform comes to rest and holds instead. Targets stay in the workspace,
+    and the set-point only moves if it can still stop within it.
     """
 
     name = "pose"
@@ -71,9 +71,9 @@ class PoseProgram(PlatformProgram):
         self._hindrance, self._contact_pair = hand_target.FREE, -1
         self._clutched = False
         self._commanded: FloatArray | None = None
-        """The last position commanded and not reached, to which `resume` goes."""
+        """The last commanded position that was not reached, to which `resume` moves."""
         self._asked_m_s = float(parts.speed[0])
-        """The speed of that command, which `resume` uses unless another is given."""
+        """The speed of that command, which `resume` uses unless another speed is given."""
         self._has_command = False
         self._cycle = -2
         """The last cycle in which this program moved the platform."""
@@ -84,7 +84,7 @@ class PoseProgram(PlatformProgram):
         self._saved_setpoint = np.zeros((3, d))
         k = self._k
         self._parts_of_target = [*(slice(i, i + 1) for i in range(k)), *[slice(k, d)] * (d > k)]
-        # compiled here, not when a motion or the stream begins
+        # this call compiles the kernels before a motion or the stream begins
         self._follow_sample()
         self._apply_deadband()
         exponential(np.zeros(3), np.eye(3))
@@ -100,12 +100,12 @@ class PoseProgram(PlatformProgram):
 
     @property
     def stream_age_s(self) -> float:
-        """Age of the newest sample, nan if no stream is followed."""
+        """Age of the newest sample; nan if the program follows no stream."""
         return self.stream.age_s if self._following else math.nan
 
     @property
     def stream_buttons(self) -> int:
-        """The buttons of the sample that is played, 0 if no stream is followed."""
+        """Buttons of the present sample; 0 if the program follows no stream."""
         return self.stream.buttons if self._following else 0
 
     def progress(self) -> dict[str, Any]:
@@ -123,7 +123,7 @@ class PoseProgram(PlatformProgram):
         return state
 
     def _held_back(self) -> str:
-        """Return why set-point or target are held back, "" if they are not."""
+        """Return the reason why set-point or target are held back, or ""."""
         lags = super()._held_back()
         if lags or not self._goal_moves:
             return lags
@@ -141,7 +141,7 @@ class PoseProgram(PlatformProgram):
         return ", ".join([why, *at])
 
     def _infeasibility_at(self, position: FloatArray) -> str:
-        """Return where and why a position is not feasible, "" if it is."""
+        """Return a text that says where and why a position is infeasible, or ""."""
         why_not = self._control.infeasibility(position)
         if not why_not:
             return ""
@@ -149,7 +149,7 @@ class PoseProgram(PlatformProgram):
 
     @property
     def _goal_moves(self) -> bool:
-        """Whether the goal may move anywhere in each cycle: its way has not been checked."""
+        """Whether the goal may move freely in each cycle, so that its way has not been checked."""
         return self._following
 
     # -- commands
@@ -185,7 +185,7 @@ class PoseProgram(PlatformProgram):
         return key, commanded, speed
 
     def _position(self, keys: CommandArguments) -> FloatArray:
-        """Return the commanded position (d,); omitted coordinates keep their values."""
+        """Return the commanded position (d,); omitted coordinates do not change."""
         k, control, position = self._k, self._control, np.zeros(self._target.size)
         acceleration = self._parts.acceleration
         stopping_position(control.position, control.velocity, acceleration, position)
@@ -215,8 +215,8 @@ class PoseProgram(PlatformProgram):
     def _from_here(self, keys: CommandArguments, arguments: Mapping[str, Any]) -> FloatArray:
         """Return the position (d,) that is `distance_m` and `turn_rad` away.
 
-        It is counted from the target while the platform moves there, else from the position at
-        which the set-point is or comes to rest.
+        Distances are relative to the target while the platform moves there. Otherwise they are
+        relative to the position at which the set-point rests or comes to rest.
         """
         k, about, along = self._k, self._about, self._directions[: self._k]
         start, Q, step = np.zeros(self._target.size), np.empty((3, 3)), np.empty((3, 3))
@@ -248,10 +248,10 @@ class PoseProgram(PlatformProgram):
     def _keep_inside(
         self, position: FloatArray, asked: Mapping[str, Any], start: FloatArray | None = None
     ) -> None:
-        """Raise ProgramError for a target (d,) that cannot be reached; round it into its bounds.
+        """Raise ProgramError if a target (d,) cannot be reached; round it into its bounds.
 
-        A relative motion begins at `start`. The position is not checked if an absolute motion does
-        not change it.
+        A relative motion begins at `start`. If an absolute motion does not change the position, the
+        position is not checked.
         """
         k, most_rad = self._k, self._parts.model.angle_rad
         leads = "" if asked.keys() & {*_ABSOLUTE} else "leads to "
@@ -274,7 +274,7 @@ class PoseProgram(PlatformProgram):
         self._require_way(position, asked)
 
     def _beyond_box(self, position: FloatArray) -> str:
-        """Return which coordinate is out of the box of targets, "" if none is."""
+        """Return a text that says which coordinate is outside the box of targets, or ""."""
         off = np.abs(position[: self._k] - np.clip(position[: self._k], self._low, self._high))
         i = int(off.argmax())
         if off[i] <= _ROUNDING:
@@ -285,7 +285,7 @@ class PoseProgram(PlatformProgram):
         )
 
     def _beyond_angle(self, position: FloatArray) -> str:
-        """Return that a rotation is larger than that of targets, "" if it is not."""
+        """Return a text if a rotation exceeds the workspace angle, else ""."""
         angle, most_rad = float(np.linalg.norm(position[self._k :])), self._parts.model.angle_rad
         if angle <= most_rad + _ROUNDING:
             return ""
@@ -331,7 +331,7 @@ class PoseProgram(PlatformProgram):
             self._target[:] = self._stopping_position()
 
     def _set_out(self, commanded: FloatArray) -> None:
-        """Set out for a target, from rest so that all directions take the same time."""
+        """Start towards a target; from rest, all directions take the same time."""
         control = self._control
         self._target[:] = commanded
         self._speed[:] = self._commanded_speed
@@ -357,7 +357,7 @@ class PoseProgram(PlatformProgram):
         return at_rest
 
     def _set_out_again(self) -> None:
-        """Start again straight to the target after an infeasible way; or give the target up."""
+        """Try a straight way to the target after an infeasible way, or give up the target."""
         here, commanded, scale_m = self._control.position, self._commanded, self._parts.scale_m
         if self._blocked or commanded is None:
             return
@@ -374,7 +374,8 @@ class PoseProgram(PlatformProgram):
         if state is StreamState.STOPPED:
             self._target[:] = self._stopping_position()
         elif stream.epoch != self._epoch or stream.buttons & CLUTCH or self._clutched:
-            # in the cycle in which the clutch closes, part of the motion was made with it open
+            # in the cycle in which the clutch closes, part of the motion happened with the clutch
+            # open
             if stream.epoch != self._epoch or not self._clutched:
                 self._target[:] = self._stopping_position()
             self._epoch = stream.epoch
@@ -386,14 +387,14 @@ class PoseProgram(PlatformProgram):
         self._advance(self._goal)
 
     def _apply_deadband(self) -> None:
-        """Write the goal: the target behind a soft dead band, because hands tremble."""
+        """Write the goal: the target after a soft dead band, which suppresses tremor of hands."""
         self._deadband_weight = soft_deadband(
             self._target, self._control.position, self._parts.scale_m, self._deadband_weight,
             _DEADBAND_m, self._goal,
         )  # fmt: skip
 
     def _follow_sample(self) -> None:
-        """Move the target by the stream's motion, as far as it is feasible."""
+        """Move the target by the stream's motion, as far as that is feasible."""
         control, goal, target = self._control, self._goal, self._target
         self._hindrance = hand_target.lead(
             self.stream.scale, self.stream.pose, self._last_sample, self._about,
@@ -407,7 +408,8 @@ class PoseProgram(PlatformProgram):
         if near < 0 and (control.is_feasible(goal) or not control.is_feasible(target)):
             target[:] = goal
             return
-        # if not in all directions, along the edge in one; turning is one of them
+        # if it is infeasible in all directions together, try each alone, along the edge of the
+        # workspace; rotation counts as one direction
         for part in self._parts_of_target:
             self._previous_target[part], target[part] = target[part], goal[part]
             if control.is_feasible(target) and control.contact_at(target) < 0:
@@ -423,7 +425,7 @@ class PoseProgram(PlatformProgram):
         if self._goal_moves:
             self._stop_straight()
         stops = control.is_feasible(self._rest)
-        # all of the way to a pose has been checked before
+        # the whole way to a pose has been checked before
         near = control.contact_ahead(self._rest) if self._goal_moves else -1
         if near >= 0:
             self._contact_pair = near
@@ -444,7 +446,7 @@ class PoseProgram(PlatformProgram):
         return arrived
 
     def _stop_straight(self) -> None:
-        """Write the position at which it comes to rest if it brakes straight, and how it brakes."""
+        """Write the position of rest after braking on a straight line, and the braking motion."""
         control = self._control
         along_velocity(control.velocity, self._parts.acceleration, self._stopping_acceleration)
         stopping_position(

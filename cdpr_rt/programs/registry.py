@@ -41,8 +41,8 @@ def platform_parts(
 ) -> PlatformParts | None:
     """Return the shared parts of a platform's programs; None without a platform.
 
-    `learns`: learn friction and cogging of motors in motion that were not commissioned.
-    Raises GeometryError if its tensions have no bounds to hold it with.
+    If `learns`, the control learns friction and cogging of uncommissioned motors in motion. Raises
+    GeometryError if the bounds of the tensions do not allow them to hold the platform.
     """
     if robot.platform is None:
         return None
@@ -67,8 +67,8 @@ def build_programs(
 ) -> dict[str, Program]:
     """Return a robot's programs by name, in the order of their numbers in its description.
 
-    `block` has the set-point stream; `parts` are given if the robot's platform is moved. Then
-    `own` are further programs, see `checked_programs`. Raises ControlError.
+    `block` has the set-point stream. `parts` are given if the robot has a platform to move. In that
+    case, `own` are user-written programs, see `checked_programs`. Raises ControlError.
     """
     loop = PositionLoop(model)
     stream = PoseStream(block, model.period_s)
@@ -80,7 +80,7 @@ def build_programs(
         }
     programs: tuple[Program, ...] = (
         IdleProgram(model),
-        AxisProgram(model, loop),  # which brakes and holds
+        AxisProgram(model, loop),  # the program `hold`
         JogProgram(model, loop),
         SweepProgram(model),
         PidProgram(model, loop),
@@ -110,14 +110,14 @@ def warm_up_programs(
 ) -> None:
     """Run each program for some cycles on n imaginary axes, so that its kernels are compiled.
 
-    A kernel is compiled when it is first called, which may take seconds.
+    The first call of a kernel compiles it, which may take seconds.
     """
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
     _run_each(programs, feedback, setpoint, torque)
     if parts is not None:
         parts.assume_at_home(feedback)
         for program in programs.values():
-            parts.tight = True  # idle and jog slacken
+            parts.tight = True  # `idle` and `jog` have marked the cables as slack
             _run_each({program.name: program}, feedback, setpoint, torque)
         parts.forget()
 

@@ -12,41 +12,42 @@ from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.jit import bound, jit
 from cdpr_rt.programs.platform_program import PlatformParts
 
-# Kernel of a cycle of slack take-up: phase of each cable, and command to its winch.
+# Kernel for one cycle of slack take-up: phase of each cable, and command to its winch.
 
 TAKE_UP_m_s = 0.05
 """Speed at which slack is taken up."""
 TAKE_UP_SHARE = 0.4
 """Tension while some cables are slack, as a share of the pretension."""
 LOOSE_m = 0.02
-"""Largest distance by which cables may be reeled in together. Beyond it, friction was mistaken for
-tension, or the platform has moved."""
+"""Largest distance by which cables may be reeled in together. A larger distance means that friction
+was mistaken for tension, or that the platform has moved."""
 PULLED = 0.95
-"""Share of its tension bound above which a winch counts as pulling with its full bound."""
+"""Share of its tension bound above which a winch is taken to pull with the full bound."""
 _SLOW_SHARE, _MEAN_S = 1.0 / 3.0, 0.04
-"""Below that share of the speed, averaged over this time, a cable may be tight."""
+"""A cable may be tight if its speed, averaged over this time, is below this share of the take-up
+speed."""
 _HELD = 0.9
-"""Share of the sag tension with which a winch holds a cable that does not count as tight."""
+"""Share of the sag tension with which a winch holds a cable that is not tight."""
 _RAISED_1_s = 2.0
 """Increase per second of a stationary winch's pull, as a share of the pull at which no winch
 sticks."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
-"""Slack left to a cable until all have been tight, and the longest time to pay it out."""
+"""Slack that a cable keeps until all cables have been tight, and the longest time to pay it out."""
 
 LOOSENED, NEXT, REELED_IN, PAID_OUT, WAITING, CLOSING, TIGHT = range(7)
 """Phases of a cable: paid out a little at first; held until its turn; reeled in alone; paid out
-again after being tight; held with that slack for the others; reeled in with all others; tight. They
-follow in this order unless a cable begins again. All cables are in one of the last two phases, or
-none is."""
+again after it was tight; held with this slack until the others are ready; reeled in with all
+others; tight. The phases follow in this order unless a cable begins again. If one cable is in one
+of the last two phases, all cables are."""
 (
     FROM_rad, MEAN_m_s, MAY_N, TURNED_N, FREE_N, TIGHT_N, SLACK_m, CYCLES, FIRST_rad, FIRST_N,
     STATE,
 ) = range(11)  # fmt: skip
-"""State of a cable: angle from which it is reeled in or paid out; mean speed inwards; tension with
-which it may be reeled in; the most that has turned its winch, including the cable's weight, and the
-most while it surely was slack; tension once tight, else 0; how far it was reeled in until then;
-cycles of paying out; angle at which it was first tight alone, nan until then, and its tension
-there."""
+"""State of a cable: angle at which reeling in or paying out begins; mean speed inwards; tension
+with which it may be reeled in; largest tension that has turned its winch, including the cable's
+weight, and the largest while it was certainly slack; tension when tight, else 0; distance by which
+it was reeled in until it was tight; cycles of paying out; angle at which it was first tight alone,
+nan before that, and its tension there."""
 
 
 class Winches(NamedTuple):
@@ -62,7 +63,7 @@ class Winches(NamedTuple):
     """Tensions with which one cable alone does not move the platform on its stand."""
     stands_N: FloatArray
     """Pull that the platform withstands. A larger pull, in addition to the friction of the winch,
-    only drags the platform."""
+    would only drag the platform."""
     hangs_N: FloatArray
     """Tensions up to which a cable sags under its own weight, and is not tight."""
     speed_rad_s: FloatArray
@@ -74,10 +75,10 @@ class Winches(NamedTuple):
 
 @jit
 def enter(first: int, phase: IntArray, state: FloatArray, position: FloatArray) -> None:
-    """Begin the phase `first` for all cables at these angles (n,), none of them being tight."""
+    """Begin the phase `first` for all cables at these angles (n,); no cable is tight yet."""
     for i in range(phase.size):
         phase[i] = first
-        # one that only begins to turn, or is still pulled as before, does not count as tight
+        # a cable that only begins to turn, or still has its previous tension, is not tight
         state[i, FROM_rad], state[i, MEAN_m_s] = position[i], TAKE_UP_m_s
         state[i, TIGHT_N] = state[i, CYCLES] = 0.0
 
@@ -87,7 +88,7 @@ def take_up(
     w: Winches, phase: IntArray, state: FloatArray, position: FloatArray, pretension: FloatArray,
     share: float,
 ) -> int:  # fmt: skip
-    """Raise bounds and set speeds; return the tight cable reeled in furthest, if too far, else -1.
+    """Raise bounds and set speeds; return the tight cable that was reeled in too far, else -1.
 
     `state` is (n, STATE). See `SlackTakeUp.update`.
     """
@@ -101,7 +102,7 @@ def take_up(
             most = max(most, w.enough_N[i])
         most = max(most, w.hangs_N[i])
         if not w.at_once and state[i, FREE_N] > 0.0:
-            # else the tension that drags the platform along would count as what its winch needs
+            # otherwise a tension that drags the platform would count as friction of the winch
             free = max(state[i, FREE_N], w.harmless_N[i])
             most = min(most, max(free + w.stands_N[i], w.hangs_N[i]))
         most = min(most, pretension[i])
@@ -122,7 +123,7 @@ def take_up(
 
 @jit
 def _whose_turn(phase: IntArray) -> int:
-    """Return which cable is reeled in alone from now on, -1 for none.
+    """Return the cable that is reeled in alone from now on, -1 for none.
 
     One tight cable does not move the platform, but two that become tight together would turn it.
     """
@@ -148,12 +149,12 @@ def _next_phase(
         return NEXT if phase == LOOSENED else WAITING
     if phase in (NEXT, WAITING):
         return phase
-    # the 5 mm paid out have to be reeled in again, or a slack cable has stuck
+    # unless the 5 mm paid out were reeled in again, a slack cable was stuck
     returned = reeled_m >= (0.5 if phase == CLOSING else -0.5) * _LEFT_m
-    # while it surely is slack
+    # while the cable is certainly slack
     if phase == REELED_IN and not returned and not w.at_once and _turns(w, i):
         state[FREE_N] = max(state[FREE_N], w.tension_N[i])
-    tight = _seems_tight(w, i, state, most, returned)  # also learns what turns the winch
+    tight = _seems_tight(w, i, state, most, returned)  # also learns the winch's friction
     if not tight or phase == TIGHT:
         return phase
     state[FROM_rad], state[CYCLES] = position, 0.0
@@ -167,10 +168,10 @@ def _next_phase(
 
 @jit
 def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: bool) -> bool:
-    """Return whether cable i, which is reeled in, is tight by its speed and tension."""
+    """Return whether speed and tension show that cable i, which is being reeled in, is tight."""
     inwards_m_s, tension = -w.cable_m[i] * w.speed_rad_s[i], w.tension_N[i]
     mean_m_s = state[MEAN_m_s] + w.period_s / _MEAN_S * (inwards_m_s - state[MEAN_m_s])
-    # a winch that breaks loose turns before its mean shows it
+    # a winch that breaks loose turns before its mean speed shows that
     state[MEAN_m_s] = max(mean_m_s, inwards_m_s)
     if not w.at_once and _turns(w, i):
         state[TURNED_N] = max(state[TURNED_N], tension)
@@ -183,7 +184,7 @@ def _seems_tight(w: Winches, i: int, state: FloatArray, most: float, returned: b
 
 @jit
 def _turns(w: Winches, i: int) -> bool:
-    """Return whether winch i reels in at half of the speed or more."""
+    """Return whether winch i reels in at half of the commanded speed or more."""
     return bool(-w.cable_m[i] * w.speed_rad_s[i] > 0.5 * TAKE_UP_m_s)
 
 
@@ -193,7 +194,7 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
     if phase == TIGHT:
         w.high_N[i] = state[TIGHT_N]
     elif phase in (REELED_IN, CLOSING) and not w.at_once:
-        # a cable that becomes tight in motion must not pull the platform along before that is seen
+        # a cable that becomes tight in motion must not drag the platform before this is detected
         if not _turns(w, i) and w.tension_N[i] >= PULLED * state[MAY_N]:
             raised = state[MAY_N] + _RAISED_1_s * w.period_s * w.enough_N[i]
             state[MAY_N] = min(raised, most)
@@ -204,7 +205,7 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
         if phase == PAID_OUT:
             # two tight cables may move the platform; a heavy cable would run out
             w.high_N[i] = w.hangs_N[i]
-    elif phase in (NEXT, WAITING):  # held, or cogging would turn it
+    elif phase in (NEXT, WAITING):  # held, because cogging might turn it
         w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], 0.0
         w.high_N[i] = min(w.high_N[i], max(w.enough_N[i], w.hangs_N[i]))
 
@@ -213,38 +214,42 @@ _ENOUGH = 1.25
 """Tension at which no winch sticks, as a multiple of the usual friction of winches."""
 _STILL_m, _STILL_S, _STILL_COUNTS = 0.0003, 0.3, 2.5
 _TURNED_m = 0.005
-"""A winch that has turned this far has not just stuck."""
+"""A winch that has turned this far has not merely been stuck."""
 _WEAK_S = 0.04
-"""Time for which a motor may pull with less after its encoder has shown a count or two."""
+"""Time for which a motor may pull less after its encoder has moved by a count or two."""
 _USUAL_SHARE = 0.45
-"""Tension that usually turns a winch with a slack cable, as a share of its largest friction."""
+"""Tension that usually turns a winch with a slack cable, as a share of the largest friction."""
 _STAND_FRICTION, _ASIDE_SHARE = 0.3, 0.5
-"""Friction of the stand over the platform's weight; share of it that one cable may pull with."""
+"""Friction of the stand, as a share of the platform's weight; share of that friction with which one
+cable may pull."""
 _HANGING_SHARES = np.linspace(0.05, 1.0, 96)[:, None]
 """Shares of the pretension at which the sag of the cables is computed."""
 _MOVED_m, _ALONE_m = 0.005, 0.0025
-"""Difference between a cable's lengths when tight alone and when all are tight, above which the
-platform has moved; and the difference of all other cables below which only its winch was stuck."""
+"""The platform has moved if a cable's lengths when it is tight alone and when all are tight differ
+by more than the first distance. If all other cables differ by less than the second one, only the
+winch of this cable was stuck."""
 _LEAST_SHARE = 0.2
-"""Least tension of a cable, as a share of its pull, if its winch's friction is as much."""
+"""Least tension of a cable, as a share of the pull of its winch, if friction may be as large as the
+pull."""
 _ALONG_m = 1.5 * LOOSE_m
-"""Least distance that is reported if a light platform may have been dragged."""
+"""Least distance to report if the cables may have dragged a light platform."""
 _DIRECTIONS, _POINTS, _ABOUT_UP = 16, 0.2, 5
-"""Horizontal directions examined, how much a cable has to point there to pull, and which component
-of a twist turns about the vertical."""
+"""Number of horizontal directions examined; least component of a cable's direction along one of
+them with which it pulls; index of the twist's component about the vertical."""
 _REMEDY = "take up slack by hand, or hold the platform"
 
 
 class SlackTakeUp:
     """Reels in n cables until all are tight, while the platform stands.
 
-    One cable may have much more slack than another, and the platform's weight withstands only some
-    newtons. So each cable is paid out a little, reeled in until it is tight, and paid out a little
-    again. Then all become tight together, each with no more pull than before. A winch may pull
-    harder than has turned it before only while it stands still. Its cable is tight if the winch
-    stands although its pull has turned it before and the stand surely withstands it, or although
-    the pull exceeds the friction of winches. If the pull that turns a winch can slide or tip a
-    light platform on its stand, the cables are reeled in together from the beginning.
+    One cable may have much more slack than another, and the platform on its stand withstands a pull
+    of only some newtons. So each cable is paid out a little, reeled in until it is tight, and paid
+    out a little again. Then all cables become tight together, each with no more pull than before.
+    Only a winch that stands still may pull harder than the pull that has turned it before. A cable
+    is tight if its winch stands in one of two cases: the same pull has turned it before and the
+    stand certainly withstands it, or the pull exceeds the friction of winches. If the pull that
+    turns a winch can slide or tip a light platform on its stand, all cables are reeled in together
+    from the beginning.
     """
 
     def __init__(
@@ -271,7 +276,7 @@ class SlackTakeUp:
         self.tight_N = self._state[:, TIGHT_N]
         """Pull of each tight cable, 0 for those that are not tight."""
         self.off_home = ""
-        """How far the platform may stand from home, as a notice."""
+        """Notice that says how far the platform may stand from home."""
         self._loose, self._busy = np.zeros((2, n), np.bool_)
         self._dragged, self._furthest = -1, 0
         driven = Winches(
@@ -288,14 +293,13 @@ class SlackTakeUp:
 
     @property
     def not_tight(self) -> BoolArray:
-        """Cables that are neither tight nor wait for others with a little slack, (n,); reused."""
+        """Whether each cable is neither tight nor waiting with a little slack, (n,); reused."""
         np.not_equal(self._phase, TIGHT, out=self._loose)
         np.not_equal(self._phase, WAITING, out=self._busy)
         return np.logical_and(self._loose, self._busy, out=self._loose)
 
     def pulls(self, which: BoolArray) -> str:
-        """Return the present and the highest pull of those of `which` (n,) that are being reeled
-        in."""
+        """Return present and highest pull of the cables of `which` (n,) that are reeled in."""
         pull_N, may_N = self._winches.tension_N, self._winches.high_N
         return "; ".join(
             f"{self._names[i]} pulls with {pull_N[i]:.1f} N, but only up to {may_N[i]:.1f} "
@@ -304,9 +308,9 @@ class SlackTakeUp:
         )
 
     def dragged(self, position_rad: FloatArray) -> str:
-        """Return which tight cable was reeled in too far, "" for none.
+        """Return the tight cable that was reeled in too far, as text, "" for none.
 
-        When cables are reeled in together, friction may have held one that was slack. It was not
+        When cables are reeled in together, friction may have held a slack one. Such a cable was not
         tight if it was reeled in no farther in total than the others.
         """
         i = self._dragged
@@ -327,12 +331,12 @@ class SlackTakeUp:
         )
 
     def why_moved(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return why the platform is no longer at home, "" if it may be.
+        """Return the reason why the platform is no longer at home, "" if it may be at home.
 
-        If uneven slack may have let the cables drag a light platform a little, `off_home` reports
-        that.
+        If the slack was uneven, the cables may have dragged a light platform a little; `off_home`
+        reports this.
 
-        Either all cables have just become tight, or they have been `pulled` with their pretension.
+        All cables have just become tight, or have been `pulled` with their pretension.
         """
         if self._at_once:
             self.off_home = self._along(position_rad) if pulled else ""
@@ -343,10 +347,10 @@ class SlackTakeUp:
         return why
 
     def _uneven(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return whose slack was so much larger that the platform may have moved, "" for none.
+        """Return the cable with so much more slack that the platform may have moved, "" for none.
 
         Slack is the length of cable reeled in so far, without its stretch. A winch that did not
-        turn while the others became tight may turn only once all are `pulled` harder.
+        turn while the others became tight may turn only when all are `pulled` harder.
         """
         slack_m = self._slack_m(position_rad)
         told = pulled | (np.abs(slack_m) > _TURNED_m)
@@ -378,11 +382,12 @@ class SlackTakeUp:
         return np.asarray(self._state[:, SLACK_m] + on_m - stretch_m)
 
     def _moved(self) -> tuple[str, str]:
-        """Return why the cables must not be tightened, and a notice; "" for none.
+        """Return the reason why the cables must not be tightened, and a notice; each may be "".
 
-        If a cable is tight at another length than when it first was tight alone, apart from stretch
-        and friction, the platform has moved meanwhile. If only one is, and farther in, its winch
-        may have been stuck; this is certain if several cables would have shown such a motion.
+        A cable was first tight alone. If it is now tight at another length, apart from stretch and
+        friction, the platform has moved in between. If this is true of only one cable, which is now
+        shorter, its winch may have been stuck at first. That is certain if several cables would
+        have shown a motion of the platform.
         """
         state, length_m = self._state, self._lengths_at_home
         in_m = (state[:, FIRST_rad] - state[:, FROM_rad]) * self._cable
@@ -390,7 +395,7 @@ class SlackTakeUp:
         # friction may be as large as this pull
         true_N = np.maximum(self.tight_N - self._usual_N, _LEAST_SHARE * self.tight_N)
         rubbed_m = length_m(true_N) - length_m(self.tight_N)
-        # a cable that sagged where it was first tight had no length there
+        # a cable that sagged when it was first tight has no reference length
         off_m = np.nan_to_num(np.abs(in_m) - rubbed_m, nan=-np.inf)
         i = int(off_m.argmax())
         if not off_m[i] > _MOVED_m:
@@ -402,7 +407,7 @@ class SlackTakeUp:
         )
         if in_m[i] > 0.0 and np.count_nonzero(off_m > _ALONE_m) == 1:
             if off_m[i] > self._alone_m[i]:
-                return "", ""  # the others would have shown it: the winch had stuck
+                return "", ""  # the other cables would have shown a motion, so the winch was stuck
             return (
                 "",
                 f"{told}: its winch was stuck, or the platform may stand about this far from home",
@@ -413,11 +418,12 @@ class SlackTakeUp:
         ), ""
 
     def _along(self, position_rad: FloatArray) -> str:
-        """Return how far a light platform may stand from home, "" if it is near.
+        """Return how far a light platform may stand from home, as text, "" if it is near.
 
         Cables that are reeled in together drag it until all cables that point in one direction are
-        tight: t = min s_i/(u_i e), with the slack s_i of a cable along u_i, in the horizontal
-        direction e that gives the furthest distance. They turn it likewise.
+        tight. The distance is t = min s_i/(u_i e), with the slack s_i of a cable along u_i, for the
+        horizontal direction e with the largest distance. The same holds for a rotation about the
+        vertical.
         """
         slack_m = np.maximum(self._slack_m(position_rad), 0.0)
         aside_m, turned_m = _most_m(self._aside, slack_m), _most_m(self._about_up, slack_m)
@@ -432,9 +438,10 @@ class SlackTakeUp:
         )
 
     def begin(self, position_rad: FloatArray) -> None:
-        """Begin again at these angles (n,), with no cable known as tight.
+        """Begin again at these angles (n,), with no cable known to be tight.
 
-        All are paid out a little first: the friction of a winch is unknown until it turns.
+        All cables are paid out a little first, because the friction of a winch is unknown until it
+        turns.
         """
         self._state[:, (MAY_N, TURNED_N, FREE_N, SLACK_m)] = 0.0
         self._state[:, FIRST_rad] = np.nan
@@ -443,9 +450,9 @@ class SlackTakeUp:
         enter(first, self._phase, self._state, position_rad)
 
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> bool:
-        """Raise the winches' bounds of tension and set speeds, (n,); return whether it continues.
+        """Raise the winches' bounds of tension and set speeds, (n,); return if take-up continues.
 
-        Cables that are reeled in pull with a share of their allowed tension, which grows to 1; they
+        Cables that are reeled in pull with a share of their allowed tension, which grows to 1. They
         pull harder only if the bounds already allow it.
         """
         self._dragged = self._take_up(position_rad, pretension_N, share)
@@ -455,9 +462,10 @@ class SlackTakeUp:
 
 
 def _most_m(towards: FloatArray, slack_m: FloatArray) -> float:
-    """Return how far slack (n,) allows motion in the direction, of m, that allows the most.
+    """Return how far slack (n,) allows motion in the direction, of m, that allows the largest.
 
-    `towards` (m, n) is how much shorter each cable becomes per m; 0 if it does not point there.
+    `towards` (m, n) is the shortening of each cable per metre of motion; 0 if the cable does not
+    point in that direction.
     """
     points = towards > _POINTS
     ways_m = np.where(points, slack_m / np.maximum(towards, _POINTS), np.inf).min(axis=1)
@@ -465,7 +473,7 @@ def _most_m(towards: FloatArray, slack_m: FloatArray) -> float:
 
 
 def _towards_exits(parts: PlatformParts) -> FloatArray:
-    """Return how much shorter each cable becomes per m along horizontal directions, (m, n)."""
+    """Return the shortening of each cable per metre along horizontal directions, (m, n)."""
     model, aside = parts.model, parts.model.positions - 1
     angles = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     if aside == 1:
@@ -475,10 +483,10 @@ def _towards_exits(parts: PlatformParts) -> FloatArray:
 
 
 def _seen_alone(parts: PlatformParts) -> FloatArray:
-    """Return the largest change of each cable per m of change of all others, (n,).
+    """Return the largest change of each cable's length per metre of change of all others, (n,).
 
-    |J_i J_o^+| in the sum norm, with the rows J_o of the others, for motion of the platform at
-    home; infinite if the others leave a direction free.
+    It is |J_i J_o^+| in the sum norm, with the rows J_o of the other cables, for motion of the
+    platform at home. It is infinite if the others leave a direction free.
     """
     J = parts.model.kinematics.wrench_matrix(parts.model.home_pose).T
     most = np.full(len(J), np.inf)
@@ -490,9 +498,10 @@ def _seen_alone(parts: PlatformParts) -> FloatArray:
 
 
 def _turned(parts: PlatformParts) -> tuple[FloatArray, float]:
-    """Return the same for a turn about the vertical, per m at an arm, (m, n), and the arm.
+    """Return the shortenings (m, n) for a turn about the vertical, per m at an arm, and the arm.
 
-    No directions if it does not turn: in a vertical plane its weight keeps it on its stand.
+    There are no directions if the platform does not turn: in a vertical plane its weight keeps it
+    on its stand.
     """
     model = parts.model
     if model.positions < 3 or _ABOUT_UP not in model.kinematics.directions:
@@ -503,21 +512,22 @@ def _turned(parts: PlatformParts) -> tuple[FloatArray, float]:
 
 
 def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:
-    """Return the tensions (n,) below which reeling in mostly reduces sag, 0 for none.
+    """Return the tensions (n,) below which reeling in mostly reduces sag, 0 without sag.
 
-    From there to the pretension a straight cable is reeled in by its stretch at the pretension.
+    From such a tension to the pretension, a cable is reeled in no further than a straight cable
+    stretches at the pretension.
     """
     tensions_N = _HANGING_SHARES * pretension_N
     lengths_m = np.array([parts.control.lengths_at_home(tension_N) for tension_N in tensions_N])
     steps = np.arange(_HANGING_SHARES.size)[::-1, None]
     straight_m = lengths_m[-1] + steps * (lengths_m[-2] - lengths_m[-1])
-    # a heavy cable that is hardly pulled has no length that reaches
+    # a heavy cable with hardly any tension reaches at no length
     hangs = ~(lengths_m - straight_m <= 0.5 * LOOSE_m)
     return np.asarray(np.max(np.where(hangs, tensions_N, 0.0), axis=0))
 
 
 class Stillness:
-    """Detects that n cables have stood still for a while, apart from flicker of the encoders."""
+    """Detects that n cables have stood still for a while, apart from noise of the encoders."""
 
     def __init__(self, cable_m: FloatArray, count_rad: FloatArray, period_s: float) -> None:
         self._cable, self._cycles = cable_m, math.ceil(_STILL_S / period_s)
@@ -525,16 +535,17 @@ class Stillness:
         self._still_m = np.maximum(_STILL_m, _STILL_COUNTS * count_rad * np.abs(cable_m))
         self._at_rad, self._still, self._weak = np.zeros(cable_m.size), 0, 0
         self.moved_m = np.zeros(cable_m.size)
-        """Distance that each has moved since it last stood still."""
+        """Distance that each cable has moved since it last stood still."""
 
     def begin(self, position_rad: FloatArray) -> None:
         """Begin again at these angles (n,)."""
         self._at_rad[:], self._still = position_rad, 0
 
     def lasts(self, position_rad: FloatArray, pulled: bool) -> bool:
-        """Process a cycle; return whether they have stood still, and were pulled, for long enough.
+        """Process a cycle; return whether cables stood still, and were pulled, for long enough.
 
-        A count in a cycle is a speed at which a winch pulls with less for a moment.
+        An encoder count within a cycle looks like a speed, at which the winch pulls less for a
+        moment.
         """
         np.abs((position_rad - self._at_rad) * self._cable, out=self.moved_m)
         self._weak = 0 if pulled else self._weak + 1

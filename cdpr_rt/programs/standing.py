@@ -1,4 +1,4 @@
-"""Checks with just tight cables whether a platform stands as `tighten` assumes."""
+"""Checks, when cables have just become tight, whether a platform stands as `tighten` assumes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from cdpr_rt.programs.platform_program import PlatformParts, distance_m
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
 _TURNED_MORE_rad = math.radians(30.0)
-"""Allowed rotation of a standing platform beyond that of targets."""
+"""Allowed rotation of a standing platform beyond the workspace angle."""
 _MOST_LOOKS = 200
 _CARRIED_SHARE = 0.8
-"""Sum of the tensions over the weight below which the cables do not carry the platform."""
+"""Ratio of the sum of tensions to the weight below which the cables do not carry the platform."""
 _FALLEN = (
     "the platform hung when the power went off, or when a drive or cable failed. "
     "It has come down, may have turned over, and cables may lie around it. Look at "
@@ -29,7 +29,7 @@ _FALLEN_ELSEWHERE = "; if it stands like this elsewhere: from lengths"
 
 
 def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefusal:
-    """Return the refusal to take the cables' lengths from the source in `asked`."""
+    """Return the refusal to use the source of cable lengths in `asked`."""
     arguments = {"why": why, "allowed": allowed}
     return CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", asked, arguments)
 
@@ -37,7 +37,7 @@ def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> CommandRefu
 def source_refusal(
     parts: PlatformParts, source: str, asked: Mapping[str, Any]
 ) -> CommandRefusal | None:
-    """Return why lengths from this source cannot be used, None if they can.
+    """Return the refusal if lengths from this source cannot be used, else None.
 
     After a fall or a release of the platform the user must name the source (`asked`).
     """
@@ -62,12 +62,11 @@ def source_refusal(
 
 
 def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
-    """Return why the slack of a platform that should stand at home must not be wound in, "" if it
-    may.
+    """Return the reason why slack must not be wound in at home, or "".
 
-    Winding in may drag a platform that lies elsewhere. If cables of length `length_m` (n,) do not
-    even reach home, within its tolerance and that of lengths, it is not at home, however slack they
-    are. One cable may have slipped, as in `why_not_at_home`.
+    Winding in may drag a platform that lies elsewhere. The platform is certainly not at home if
+    cables of lengths `length_m` (n,) do not even reach home, within its tolerance and that of
+    lengths. One cable may have slipped, as in `why_not_at_home`.
     """
     short_m = parts.control.lengths_at_home(np.zeros(length_m.size)) - length_m
     allowed_m = parts.platform.home_tolerance_m + parts.home_lengths_allowed_m
@@ -83,13 +82,12 @@ def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
 def why_not_at_home(
     parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why the cables of a platform that should stand at home must not be tightened, "" if
-    they may.
+    """Return the reason why the cables must not be tightened at home, or "".
 
-    The cables' lengths `length_m` (n,), tracked since they were known, have to be those of home at
-    `tension_N` (n,), each within the tolerance of home and that of lengths. One may be further off:
-    its cable has slipped if the lengths disagree. If they agree, their pose has to be near home.
-    Far from home no pose is searched, since several may belong to the lengths.
+    The lengths `length_m` (n,), tracked since they were known, have to be those at home with
+    `tension_N` (n,), each within the tolerance of home and that of lengths. One length may be
+    further off: its cable has slipped if the lengths disagree. If they agree, their pose has to be
+    near home. No pose is searched far from home, because several poses may belong to the lengths.
     """
     control = parts.control
     off_m = np.abs(length_m - control.lengths_at_home(tension_N))
@@ -121,10 +119,10 @@ def _not_at_home(why: str) -> str:
 def why_not_to_pull(
     parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why the cables must not be tightened at the platform's present place, "" if they may.
+    """Return the reason why cables must not be tightened at the platform's present pose, or "".
 
-    Its pose follows from the cables' lengths `length_m` (n,) at `tension_N` (n,), which have to
-    agree. It must not be turned much, and the straight way home must be free of contact.
+    The pose is computed from the lengths `length_m` (n,) at `tension_N` (n,), which have to agree.
+    The platform must not be turned much, and the straight way home must be free of contact.
     """
     control, k = parts.control, parts.model.positions
     control.take_lengths(length_m, feedback)
@@ -146,15 +144,15 @@ def would_move(parts: PlatformParts) -> str:
 
 
 def hangs(parts: PlatformParts) -> bool:
-    """Return whether the cables' tensions may carry the platform, wherever it is."""
+    """Return whether the cables may carry the platform, at whatever pose."""
     carried_N = float(np.nansum(parts.estimator.estimate.tension_N))
     return carried_N > _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2
 
 
 def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeedback) -> bool:
-    """Return whether a platform is at home by its cables' lengths (n,), and not carried by them.
+    """Return whether a platform stands at home by its lengths (n,), not carried by the cables.
 
-    After it was lowered, friction of the winches can leave tensions whose sum is its weight but
+    After lowering, friction of the winches can leave tensions whose sum equals the weight, but
     which nearly cancel each other.
     """
     control, model = parts.control, parts.model
@@ -173,10 +171,10 @@ def rests_at_home(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeed
 def why_not_to_hold(
     parts: PlatformParts, standing: StandingTensions, length_m: FloatArray, feedback: AxisFeedback
 ) -> str:
-    """Return why a hanging platform must not be held by its pose, "" if it may.
+    """Return the reason why a hanging platform must not be held at its pose, or "".
 
-    The pose follows from the cables' lengths `length_m` (n,), which have to agree. It must not be
-    turned much, and tensions within their bounds have to carry the platform there.
+    The pose is computed from the lengths `length_m` (n,), which have to agree. The platform must
+    not be turned much, and tensions within their bounds have to carry it at that pose.
     """
     control, model = parts.control, parts.model
     control.take_lengths(length_m, feedback)
@@ -207,7 +205,7 @@ def _not_pulled(here: FloatArray, k: int, why: str) -> str:
 
 
 def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
-    """Return by how much the lengths in the control disagree, if too much."""
+    """Return a text that says by how much the control's lengths disagree, "" if not too much."""
     at_home = source == "home"
     off = _off(parts, parts.home_lengths_allowed_m if at_home else parts.lengths_allowed_m)
     if off and at_home:

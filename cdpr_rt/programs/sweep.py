@@ -26,8 +26,8 @@ _Sweep = tuple[FloatArray, float, int]
 class SweepProgram(AxisProgram):
     """Turns the axes by their distances and back, leg by leg (Tremblay, section 1.3).
 
-    Friction and load leave a steady error under the proportional controller, so it is for motors
-    whose cables are off or slack.
+    With the proportional controller, friction and load leave a steady error, so the program is
+    meant for motors without cables or with slack cables.
     """
 
     name = "sweep"

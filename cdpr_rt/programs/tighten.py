@@ -34,7 +34,7 @@ from cdpr_rt.programs.standing import (
     would_move,
 )
 
-# A path of the platform on which every motor passes its index.
+# A path of the platform on which every motor passes its index pulse.
 
 _TURNS = 1.05
 """Angle that each motor must turn, one turn with a margin."""
@@ -46,8 +46,8 @@ def index_path(
 ) -> list[FloatArray]:
     """Return positions (d,) to visit in order from home, so that each motor turns once.
 
-    Straight up as far as needed, then to the sides, not turned; all of it within the workspace and
-    at positions that are `feasible`. `cable_m` (n,) is paid out per radian.
+    The path goes straight up as far as needed, then to the sides, without rotation. All of it is in
+    the workspace and at positions that are `feasible`. `cable_m` (n,) is paid out per radian.
     """
     platform, kinematics, k = model.platform, model.kinematics, model.positions
     low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
@@ -75,15 +75,15 @@ def index_path(
     return path
 
 
-# Whether cables are tight while the force that presses a platform on its stand is released.
+# Check that cables are tight while the force that presses a platform on its stand is released.
 
 _AGREE_m = 0.002
-"""Allowed disagreement of lengths just measured, in addition to stretch caused by friction."""
+"""Allowed disagreement of freshly measured lengths, in addition to stretch caused by friction."""
 _OFF_HOME_m = 0.006
-"""Distance from home, by lengths just measured there, up to which nothing is reported: friction on
-the stand causes up to 4 mm, which disappears when winches turn."""
+"""Distance from home, by lengths just measured at home, up to which nothing is reported. Friction
+on the stand causes up to 4 mm, which disappears when winches turn."""
 _RUNS_IN_m_s = 0.2
-"""Speed of a winch that is impossible with a tight cable while the platform stands."""
+"""Winch speed that is impossible with a tight cable while the platform stands."""
 _REMEDY = (
     "take up slack by hand, hold the platform, or choose tensions above the "
     "friction of the winches: see `cdpr robot show`"
@@ -93,9 +93,9 @@ _REMEDY = (
 class LettingGo:
     """Detects slack cables that were mistaken for tight ones, by their speeds and lengths.
 
-    Lengths taken where the platform stands agree there, whatever the errors of the geometry. While
-    tensions change to those that hold it, friction of the winches explains a small disagreement. A
-    slack cable, which is reeled in meanwhile, exceeds that.
+    Lengths that are measured where the platform stands agree at that pose, even with errors of the
+    geometry. While tensions change to those that hold the platform, friction of the winches causes
+    a small disagreement. A slack cable, which is reeled in at this time, causes a larger one.
     """
 
     def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
@@ -108,7 +108,7 @@ class LettingGo:
         self._inwards_m_s = np.zeros(cable_m.size)
 
     def runs_in(self) -> str:
-        """Return which winch reels in faster than any with a tight cable, "" for none."""
+        """Return the winch that reels in faster than possible with a tight cable, "" for none."""
         velocity_rad_s = self._parts.estimator.estimate.velocity_rad_s
         np.multiply(velocity_rad_s, self._cable, out=self._inwards_m_s)
         i = int(self._inwards_m_s.argmin())
@@ -120,7 +120,9 @@ class LettingGo:
         )
 
     def disagree(self) -> str:
-        """Return by how much lengths taken at home disagree, if too much, and the worst cable."""
+        """Return how much lengths taken at home disagree, and the worst cable, as text; "" if
+        little.
+        """
         control = self._parts.control
         if control.residual_m <= self._allowed_m:
             return ""
@@ -132,10 +134,10 @@ class LettingGo:
         )
 
     def off_home(self) -> str:
-        """Return how far from home the platform is by lengths taken there, "" for not far.
+        """Return how far the platform is from home by lengths taken at home, as text; "" if near.
 
-        Cables that all sag more than expected do not contradict each other: the pull on heavy ones
-        may not overcome the friction of their winches.
+        If all cables sag more than expected, they do not contradict each other. This happens if the
+        pull on heavy cables does not overcome the friction of their winches.
         """
         parts = self._parts
         here, home, k = parts.control.estimated, parts.model.home, parts.model.positions
@@ -152,19 +154,20 @@ class LettingGo:
         )
 
 
-# The cables' lengths from a platform that stands at home with tight cables.
+# Cable lengths of a platform that stands at home with tight cables.
 
 _CAME_IN_m = 0.003
-"""Length beyond twice its stretch by which a tight cable may be reeled in when pulled harder: the
-stretch that friction had prevented before."""
+"""Length, in addition to twice its stretch, by which a tight cable may be reeled in when it is
+pulled harder: friction had prevented this stretch before."""
 
 
 class LengthsAtHome:
-    """Lengths (n,) at home, by the tensions that load cells measure or that motors are to exert.
+    """Lengths (n,) at home, for tensions measured by load cells or commanded to the motors.
 
     Without a load cell, the angle at the pretension is the one that the control's `pull_fit` finds,
-    without friction and cogging; else the mean of those reached from above and from below, in which
-    friction cancels out. Known cogging is corrected once the index is known.
+    without friction and cogging. If that is not available, it is the mean of the angles reached
+    from above and from below, in which friction cancels. Known cogging is corrected once the index
+    is known.
     """
 
     def __init__(self, parts: PlatformParts, cable_m: FloatArray, pretension_N: FloatArray) -> None:
@@ -173,15 +176,15 @@ class LengthsAtHome:
         self._parts, self._cable = parts, np.array(cable_m)
         self._rising_rad = np.zeros(n)
         self._rad = np.full(n, np.nan)
-        """Angles at which lengths were taken, nan once they have been corrected."""
+        """Angles at which lengths were taken; nan after their correction."""
         self._N, self._pretension_N = np.zeros(n), np.array(pretension_N)
-        """Tensions that stretched them then, and the pretension."""
+        """Tensions that stretched the cables at these angles, and the pretension."""
         self._sure = np.zeros(n, np.bool_)
-        """Which of these are free of a motor's cogging and friction."""
+        """Whether each of these tensions is free of the motor's cogging and friction."""
         parts.control.pull_fit.prepare(pretension_N)
 
     def forget(self) -> None:
-        """Discard the angles: nothing is left to correct."""
+        """Discard the angles, because nothing is left to correct."""
         self._rad[:] = np.nan
 
     def keep_rising(self, feedback: AxisFeedback) -> None:
@@ -189,11 +192,10 @@ class LengthsAtHome:
         self._rising_rad[:] = feedback.position_rad
 
     def slack_before(self, feedback: AxisFeedback, harder: float) -> str:
-        """Return which cable was not tight when angles were stored, now pulled `harder`, "" for
-        none.
+        """Return the cable that was not tight when angles were stored, as text, "" for none.
 
-        A tight cable is reeled in only by its stretch. Not needed if the lengths can contradict
-        each other.
+        The cables are now pulled `harder`: a tight cable is then reeled in only by its stretch. The
+        check is not needed if lengths can contradict each other.
         """
         parts, pull_N = self._parts, self._pretension_N
         if self._cable.size > parts.model.size:
@@ -230,7 +232,7 @@ class LengthsAtHome:
     def correct(self, feedback: AxisFeedback) -> None:
         """Correct lengths for known cogging and friction, once the index is known.
 
-        These torques were part of the tensions by which the cables stretched.
+        These torques were part of the tensions that stretched the cables.
         """
         parts, control, known = self._parts, self._parts.control, self._parts.compensation
         if known is None or np.isnan(self._rad).any():
@@ -245,13 +247,13 @@ class LengthsAtHome:
         control.take_lengths(length_m, feedback)
 
 
-# Source of the cables' lengths when they are pulled tight, and the indices that check them.
+# Source of the cable lengths when cables become tight, and indices that check these lengths.
 
 SOURCES = ("home", "lengths", "last")
 
 
 class LengthSource:
-    """Lengths (n,) by `home`, the stand of the platform, by the estimate, or by the last stop.
+    """Lengths (n,) from `home`, the platform's stand, from the estimate, or from the last stop.
 
     `name` is one of `SOURCES`.
     """
@@ -269,11 +271,11 @@ class LengthSource:
         return "lengths" if self._parts.pose_known else "home"
 
     def begin(self) -> None:
-        """Begin again with the default."""
+        """Begin again with the default source."""
         self.name, self._last = self.default, None
 
     def before(self, source: str, feedback: AxisFeedback) -> FloatArray | None:
-        """Return the lengths (n,) that were known before, None if unknown."""
+        """Return the lengths (n,) known before tightening, None if unknown."""
         stopped, parts = self._parts.last_stop.lengths, self._parts
         if source == "last" and stopped is not None:
             return stopped.at(feedback.position_rad, self._cable)
@@ -281,9 +283,9 @@ class LengthSource:
         return parts.estimator.estimate.cable_length_m if known else None
 
     def take_last(self) -> None:
-        """Take the lengths of the last stop, which are then used up; forget those at home.
+        """Take the lengths of the last stop if they are the source; discard the lengths at home.
 
-        They are used if they are the source.
+        The lengths of the last stop can be taken only once.
         """
         last = self._parts.last_stop.take()
         self._last = last if self.name == "last" else None
@@ -298,10 +300,9 @@ class LengthSource:
         return self.at_home.take(feedback)
 
     def lacks_index(self, feedback: AxisFeedback) -> BoolArray:
-        """Return which indices (n,) are missing although compensation or the last lengths need
-        them.
+        """Return which indices (n,) are missing but needed.
 
-        The indices check the lengths of the last stop.
+        Compensation of cogging needs them, and the lengths of the last stop, which they check.
         """
         compensated = self._parts.compensation
         wanted = np.zeros(self._cable.size, np.bool_)
@@ -312,7 +313,7 @@ class LengthSource:
         return wanted & ~feedback.index_known
 
     def check_by_indices(self, feedback: AxisFeedback) -> str:
-        """Correct the lengths by the indices; return how these contradict the last stop's."""
+        """Correct the lengths by the indices; return how the indices contradict the last stop."""
         self.at_home.correct(feedback)
         parts, last = self._parts, self._parts.last_stop
         last.contradicted = ""
@@ -331,7 +332,8 @@ _RISE_1_s = 1.0
 _FALL_S = 0.2
 _HAND_OVER_S = 0.5
 _SLACK_m, _ONCE_TIGHT_m = 1.0, 0.05
-"""How far a cable may be wound in while some are slack, and once all are tight, plus stretch."""
+"""Largest length by which a cable may be wound in while some are slack, and after all are tight,
+plus stretch."""
 _TIGHT_WITHIN_S = 60.0
 
 _STAGES = (
@@ -339,20 +341,21 @@ _STAGES = (
     ("beyond", OVERSHOOT), ("lengths", 1.0),
 )  # fmt: skip
 _FITTED_FROM = 2
-"""Stage from which angles show friction and cogging; during the first rise they also show slack."""
+"""Stage from which on angles show only friction and cogging; during the first rise of tension they
+also show slack."""
 
 
 class TightenProgram(PlatformProgram):
     """Takes up slack until all cables are tight and still, pretensions them, then holds.
 
-    The platform stays on its stand meanwhile: tensions grow together to those whose wrench presses
-    it down if the cables can do that, and has no horizontal component. The cables' lengths follow
-    from home, if it stands there, from the estimate, or from the last stop. If a motor's cogging is
-    known but not its index, the platform is lifted until all have passed theirs. The program ends
-    and slackens the cables again if a cable does not become tight, if lengths disagree, or if by
-    its lengths the platform is not at the expected pose. A platform that hangs because brakes have
-    kept it is held by its pose immediately, from the torques of the last cycle on. If the pose does
-    not follow from the lengths, the command is rejected, and nothing changes.
+    The platform stays on its stand: tensions grow together to values whose wrench is vertical and,
+    if the cables can do that, presses it down. The cable lengths come from home, if the platform
+    stands there, from the estimate, or from the last stop. If the cogging of a motor is known but
+    its index is not, the platform is lifted until all motors have passed their index. The program
+    ends and slackens the cables again if a cable does not become tight, if lengths disagree, or if
+    the lengths show that the platform is not at the expected pose. If brakes have kept the platform
+    hanging, the program holds it at its pose immediately, starting with the torques of the last
+    cycle. If the lengths do not determine that pose, the command is rejected and nothing changes.
     """
 
     name = "tighten"
@@ -369,7 +372,8 @@ class TightenProgram(PlatformProgram):
         self._home_pretension_N = self._standing.at(parts.model.home_pose)[0].copy()
         self._pretension_N = self._home_pretension_N.copy()
         self._from_N, self._to_N = self._pretension_N.copy(), self._pretension_N.copy()
-        """Pretensions between which it blends, to that for where the platform stands."""
+        """Pretensions between which the program blends, the last one for the position at which the
+        platform stands."""
         self._blend = 1.0
         self._hangs = self._hands_over = False
         self._let_go_cycle = 0
@@ -377,7 +381,7 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
         self._slack = SlackTakeUp(self._winches, parts, self._cable, self._home_pretension_N)
-        # a long cable is reeled in by its sag rather than by its stretch, above the friction
+        # above the friction, a long cable is reeled in more by its sag than by its stretch
         shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
@@ -394,7 +398,7 @@ class TightenProgram(PlatformProgram):
         self._failure = ""
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Go on from the torque of the last cycle."""
+        """Continue from the torque of the last cycle."""
         parts = self._parts
         parts.follow_origins()
         self._feedback = feedback
@@ -471,12 +475,13 @@ class TightenProgram(PlatformProgram):
         return str(source), source != "home" and self._is_to_hold(source, arguments)
 
     def _is_to_hold(self, source: str, arguments: Mapping[str, Any]) -> bool:
-        """Return whether a hanging platform is to be held as it is; raises ProgramError.
+        """Return whether to hold a hanging platform at its pose; raises ProgramError.
 
-        The control's estimate is unreliable while cables may be slack, so it is computed again.
+        The pose is computed again, because the control's estimate is unreliable while cables may be
+        slack.
         """
         parts, now = self._parts, self._checked
-        # another program may have ended the hand-over since
+        # another program may have ended the hand-over in the meantime
         handing_over = self._hands_over and self._feedback.cycle - self._let_go_cycle <= 1
         if parts.tight or handing_over or not hangs(parts):
             return False
@@ -532,7 +537,7 @@ class TightenProgram(PlatformProgram):
         return ready and not self._not_tight().any()
 
     def _not_tight(self) -> BoolArray:
-        """Return which cables are slack, else which are pulled with less than their bound, (n,)."""
+        """Return which cables are slack, or if none, which are pulled below their bound, (n,)."""
         if self._stage == 0 and (slack := self._slack.not_tight).any():
             return slack
         np.multiply(self._winches.high_N, PULLED, out=self._enough_N)
@@ -545,17 +550,17 @@ class TightenProgram(PlatformProgram):
         if self._stage + 1 == len(_STAGES):
             self._end_tight(feedback, torque_Nm)
             return
-        # away from home, lengths give the pose of the platform, wherever it is pulled to
+        # away from home, lengths give the pose of the platform even if it has moved
         stage = _STAGES[self._stage][0]
         matters = stage in ("slack", "pull") and self._source.name == "home"
         moved = self._slack.why_moved(feedback.position_rad, stage == "pull") if matters else ""
-        if self._source.name == "home":  # else the lengths stay those of that notice
+        if self._source.name == "home":  # otherwise the notice stays, with its lengths
             self._parts.off_home = self._slack.off_home
         self._fail_if(moved or self._why_not_to_pull(feedback))
         if self._failure:
             return
         if stage == "slack":
-            self._share = 0.0  # begins at the cables' present pull
+            self._share = 0.0  # the rise begins at the present pull of the cables
         elif stage == "pull":
             self._control.pull_fit.begin(feedback.position_rad)
         elif stage == "back":
@@ -572,11 +577,12 @@ class TightenProgram(PlatformProgram):
         self._control.take_lengths(self._source.now(feedback), feedback)
         estimate = self._parts.estimator.estimate
         tension_N = np.where(estimate.tension_measured, estimate.tension_N, self._pretension_N)
-        # as they stand: the cables press with tensions that may stretch them more than planned ones
+        # begin with these tensions, which press the platform down and may stretch cables more than
+        # planned ones
         self._control.begin(feedback, tension_N)
         self._fail_if(disagreement(self._parts, self._source.name))
         if not self._failure:
-            if self._source.name == "home":  # other sources may belong to another pose
+            if self._source.name == "home":  # lengths of other sources may belong to another pose
                 self._control.pull_fit.begin_learning()
             self._control.begin(feedback)
             self._take_over(feedback, torque_Nm)
@@ -584,10 +590,11 @@ class TightenProgram(PlatformProgram):
             self._let_go_cycle, self._handing_over_cycles = feedback.cycle, 0
 
     def _let_go(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        """Blend out the force that presses the platform on its stand; then it may be moved.
+        """Fade out the force that presses the platform on its stand; after that it may move.
 
-        Meanwhile the stretch of its cables differs from the control's, so the set-point stays at
-        the estimated pose: the control does not push the platform against its stand.
+        During this time, the stretch of the cables differs from that in the control. So the
+        set-point stays at the estimated pose, and the control does not push the platform against
+        its stand.
         """
         self._control.stand_still(on_stand=True)
         self._loop.update(feedback, setpoint, torque_Nm)
@@ -608,19 +615,21 @@ class TightenProgram(PlatformProgram):
             self._finish(feedback, setpoint, torque_Nm)
 
     def _let_down(self, feedback: AxisFeedback, torque_Nm: FloatArray, slack: str) -> None:
-        """Pay out cables because some of them is slack and the lengths taken are wrong."""
+        """Pay out the cables because one of them is slack, so that the lengths taken are wrong."""
         self._hands_over = False
         self._parts.estimator.forget_lengths()
         speed_rad_s = self._parts.estimator.estimate.velocity_rad_s
-        # the torque of a winch that winds in fast holds nothing
+        # the torque of a winch that winds in fast does not hold a load
         runs_in = speed_rad_s * self._cable < -TAKE_UP_m_s
         self._winches.begin(feedback, speed_rad_s, np.where(runs_in, 0.0, torque_Nm))
         np.maximum(-torque_Nm / self._cable, 0.0, out=self._winches.high_N)
         self._fail_if(slack)
 
     def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
-        """Return why the cables must not be pulled further; if lengths are known, set the tensions
-        for that pose."""
+        """Return the reason why the cables must not be pulled further, or "".
+
+        If lengths are known, also set the tensions for their pose.
+        """
         parts, length_m = self._parts, self._source.before(self._source.name, feedback)
         if length_m is None:
             return ""
@@ -634,7 +643,7 @@ class TightenProgram(PlatformProgram):
         return "" if stays else would_move(parts)
 
     def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
-        """Begin to take the torques from the platform's control, starting at this cycle's."""
+        """Begin to use the torques of the platform's control, starting from those of this cycle."""
         parts = self._parts
         parts.estimator.set_lengths(feedback.position_rad, self._control.free_lengths_m)
         parts.loop.take_over(feedback, torque_Nm)
@@ -673,7 +682,7 @@ class TightenProgram(PlatformProgram):
         return ""
 
     def _late(self) -> str:
-        """Return which cables are not tight yet, and the pull on each."""
+        """Return as text which cables are not tight yet, and the pull on each."""
         told, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
         if weak.any():
             return f"{told}: {self._slack.pulls(weak)}"
@@ -693,7 +702,7 @@ class TightenProgram(PlatformProgram):
     # -- the search for indices
 
     def _look_for_indices(self) -> None:
-        """Start along a path on which all motors turn, if an index is needed."""
+        """Start a path on which all motors turn, if an index is needed."""
         parts, control = self._parts, self._control
         self._path = []
         if self._source.lacks_index(self._feedback).any():

@@ -13,7 +13,7 @@ from cdpr_rt.programs.base import Program, ProgramError
 
 
 class TrackProgram(Program):
-    """Runs what `take` was given; a stop follows the motion's own braking motion.
+    """Runs the controller and motion given to `take`; a stop follows the motion's braking ramp.
 
     The controller is reset at the start; the last program's torque is not carried over.
     """
@@ -45,20 +45,20 @@ class TrackProgram(Program):
         self.at_rest = self._stopping = False
 
     def check(self, _arguments: Mapping[str, Any]) -> Any:
-        """Raise ProgramError: there are no arguments to check."""
+        """Raise ProgramError, because commands cannot start this program."""
         raise ProgramError(f"{self.name}: only a procedure can start it, because it needs a motion")
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""
         motion = self._motion
-        assert motion is not None  # it has been started
+        assert motion is not None  # the program has been started
         motion.fill(self._cycle * self._period_s, setpoint)
         self.controller.update(feedback, setpoint, torque_Nm)
         self._cycle += 1
         self.at_rest = self._cycle > self._last
 
     def stop(self) -> None:
-        """Continue with the braking motion, from the middle of it, where its ramp-up would end."""
+        """Continue with the braking motion from its middle, at which its ramp-up would end."""
         if self._stopping or self._motion is None:
             return
         self._stopping = True

@@ -1,1 +1,1 @@
-"""Service: the control loop's interfaces to people and programs, in a separate process."""
+"""Service: interfaces of the control loop for people and programs, in a separate process."""

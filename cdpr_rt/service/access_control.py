@@ -23,11 +23,12 @@ from cdpr_profiles.bounded_input import is_mostly_text
 from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service.page import PAGE_PREFIX
 
-# A ticket opens one WebSocket instead of the key: browsers send no header with the request.
+# A ticket replaces the key for opening one WebSocket, because browsers cannot send a header with
+# that request.
 
 VALID_S: Final = 30.0
 MOST_TICKETS: Final = 64
-"""If there are more, the oldest becomes void."""
+"""Largest number of valid tickets; if there are more, the oldest becomes void."""
 
 
 class Tickets:
@@ -53,21 +54,23 @@ class Tickets:
 
 MOST_BODY_BYTES: Final = 16384
 MOST_PATH_BYTES: Final = 1 << 21
-"""Longest body of `POST /path`, a path's file."""
+"""Longest body of `POST /path`, which contains the file of a path."""
 _PATH_PATH: Final = "/path"
 _MOST_STRINGS, _MOST_OTHER_BYTES = 32, 1024
-"""Most keys and texts of a body longer than `MOST_BODY_BYTES`, and bytes beside these texts.
+"""Largest number of keys and texts in a body longer than `MOST_BODY_BYTES`, and of bytes besides
+them.
 
-The file is one of the texts. Validating 100,000 keys would take the event loop a second.
+The file is one of the texts. Validating 100,000 keys would occupy the event loop for a second.
 """
 _BODY_S = 5.0
 _REQUESTS_PER_S, _BURST = 200.0, 400.0
 _FAILURES_PER_S, _FAILURES = 2.0, 10.0
 _FAILURES_OF_ALL_PER_S, _FAILURES_OF_ALL = 20.0, 100.0
 _THROTTLE_S, _MOST_THROTTLED = 1.0, 64
-"""Delay of the answer to a wrong key or token after too many of them; most delayed answers."""
+"""Delay of the answer to a wrong key or token after too many of them; largest number of delayed
+answers."""
 _MOST_AT_ONCE: Final = 24
-"""Requests of one client that are processed at the same time."""
+"""Largest number of requests of one client that are processed at the same time."""
 _MOST_PEERS: Final = 1024
 _MOST_FIELDS = 16
 STOP_PATHS: Final = frozenset(f"/{do}" for do in STOPS)
@@ -89,14 +92,16 @@ class AccessPolicy:
     """Access policy of one listener."""
 
     key: bytes | None = None
-    """The key, required beyond the status and the page's files; without one nobody can move."""
+    """The key, required for everything except the status and the page's files; without a key no
+    client can move the robot."""
     open_reading: bool = False
     """Whether every client that can connect may watch, hold and disable without the key.
 
-    For a loopback address without a key file, which any user of the machine can reach.
+    This is for a loopback address without a key file, which every user of the machine can reach.
     """
     local: bool = False
-    """A Unix socket: its file's permissions limit who may connect; clients may do everything."""
+    """Whether it is a Unix socket: file permissions limit who may connect, and clients may do
+    everything."""
     hosts: frozenset[str] = frozenset()
     """Names of this machine, in addition to localhost and numeric addresses."""
 
@@ -106,15 +111,15 @@ class AccessPolicy:
     ) -> AccessPolicy:
         """Return the policy of a listener on TCP at `host`.
 
-        The listener also answers to this machine's names, except on loopback: there nobody needs
-        them, and on a network without DNS any machine may answer to them.
+        The listener also accepts this machine's names, except on loopback: no client needs them
+        there, and on a network without DNS any machine may claim them.
         """
         names = frozenset[str]() if loopback else names_of_this_machine()
         return cls(key, open_reading, hosts=names | {host.lower()})
 
 
 def names_of_this_machine() -> frozenset[str]:
-    """Return this machine's names: its host name, and that on a network without DNS (mDNS)."""
+    """Return this machine's names: its host name, and its name on a network without DNS (mDNS)."""
     name = socket.gethostname().lower()
     return frozenset({name, f"{name}.local"})
 
@@ -122,7 +127,7 @@ def names_of_this_machine() -> frozenset[str]:
 def is_own_host(host: str, names: Container[str]) -> bool:
     """Whether a request's `Host` is localhost, a numeric address, or one of `names`.
 
-    The host name of a web page that was redirected to this machine (DNS rebinding) is not.
+    It is False for the host name of a web page that was redirected to this machine (DNS rebinding).
     """
     name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
     name = name.removeprefix("[").removesuffix("]").lower()
@@ -138,13 +143,13 @@ def is_own_host(host: str, names: Container[str]) -> bool:
 class AccessControl:
     """Checks the key, blocks web pages, and limits the rate and size of requests.
 
-    A page open in a browser can send requests to this machine. Those carry the page's `Origin`; if
-    its name was redirected to this machine afterwards, they carry that name as `Host`. No limit
-    here applies to stops, but the server's limit of TCP connections applies to all requests.
-    Clients of the Unix socket, which all belong to its user, share no rate limit. `refused` is
-    called for every client that is rejected. `holds_right` returns whether a token is that of the
-    client that may move: a flood from its own address must not block it. If a key is required, one
-    of `tickets` opens a WebSocket.
+    A web page that is open in a browser can send requests to this machine. They carry the `Origin`
+    of the page. If the page's host name was later redirected to this machine, they carry that name
+    as `Host`. No limit here applies to stops, but the server's limit of TCP connections applies to
+    all requests. Clients of the Unix socket all belong to one user and have no common rate limit.
+    `refused` is called for every rejected client. `holds_right` returns whether a token belongs to
+    the client that may move the robot, which a flood from its own address must not block. If a key
+    is required, one of `tickets` opens a WebSocket.
     """
 
     def __init__(
@@ -166,10 +171,11 @@ class AccessControl:
         self._throttled = 0
         self._serving = Counter[str]()
         self._turns = asyncio.Lock()
-        """One request begins in each pass of the event loop, so a stop waits for at most one."""
+        """One request begins in each pass of the event loop, so a stop waits for at most one
+        request."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through, or answer it here."""
+        """Pass a request to the application, or answer it here."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -205,10 +211,13 @@ class AccessControl:
                 del self._serving[who]
 
     async def _check(self, scope: Scope) -> str:
-        """Return the client whose requests are counted together, "" if this kind is not limited."""
+        """Return the client for which the request counts, "" if this kind of request is not
+        limited.
+        """
         headers = {name.lower(): value for name, value in scope["headers"]}
         if b"content-length" in headers and b"transfer-encoding" in headers:
-            # a proxy may see its end elsewhere, and take the rest for another client's request
+            # a proxy may see the end of the request elsewhere, and treat the rest as another
+            # client's request
             raise _RefusedError(
                 HTTPStatus.BAD_REQUEST, "Content-Length and Transfer-Encoding; allowed: one of them"
             )
@@ -260,7 +269,7 @@ class AccessControl:
         if key is None:
             return self._policy.local
         scheme, _, secret = given.partition(b" ")
-        # digests: the duration of the comparison reveals nothing, not even the key's length
+        # digests are compared, so that the duration does not even reveal the length of the key
         right = hmac.compare_digest(_digest(secret.strip()), _digest(key))
         return right and scheme.lower() == b"bearer"
 
@@ -274,7 +283,7 @@ class AccessControl:
         return self._tickets.redeem(query.get("ticket", [""])[0])
 
     def _is_public(self, scope: Scope) -> bool:
-        """Whether every client that can connect may request this, with or without the key."""
+        """Whether every client that can connect may make this request, with or without the key."""
         kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
         reads = kind == "http" and method in ("GET", "HEAD")
         if self._policy.key is not None and not self._policy.open_reading:
@@ -283,9 +292,10 @@ class AccessControl:
         return reads or looks_on or (kind, method, path) in _KEYLESS_STOPS
 
     async def _throttle(self, peer: str) -> None:
-        """Note a wrong key or token; after too many, delay the answer to this client, or to all.
+        """Count a wrong key or token; after too many, delay the answer to this client, or to all.
 
-        Clients with the right key never come here. If too many wait already, refuse this one.
+        Clients with the right key are not affected. If too many answers are delayed already, reject
+        this request.
         """
         now_s = time.monotonic()
         of_this, of_all = self._failures.take(peer, now_s), self._failures_of_all.take("", now_s)
@@ -303,7 +313,7 @@ class AccessControl:
 class TokenBuckets:
     """A bucket of `burst` tokens for each peer, filled at `rate_Hz`.
 
-    If there are too many peers, the one not seen for longest is forgotten first.
+    If there are too many peers, the one with the oldest last request is removed first.
     """
 
     def __init__(self, rate_Hz: float, burst: float) -> None:
@@ -323,13 +333,13 @@ class TokenBuckets:
 
 
 def _is_stop(scope: Scope) -> bool:
-    """Whether this asks for a stop; another method at the same path does not."""
+    """Whether the request is a stop; other methods at the same path are not."""
     is_post = scope["type"] == "http" and scope["method"] == "POST"
     return is_post and scope["path"] in STOP_PATHS
 
 
 async def _read_body(receive: Receive, most: int) -> Receive:
-    """Read a body that is neither large nor slow; return a `receive` that returns it."""
+    """Read a body within limits of size and time; return a `receive` that returns it."""
     body = bytearray()
     try:
         async with asyncio.timeout(_BODY_S):

@@ -66,7 +66,9 @@ _MESSAGE_DATA: Final = 1  # the opcode of binary frames that carry a message
 
 @dataclass(frozen=True)
 class Topic:
-    """Topic for subscription; the `encoding` of its messages is `json` or `protobuf`."""
+    """A topic that viewers can subscribe to; the `encoding` of its messages is `json` or
+    `protobuf`.
+    """
 
     number: int
     name: str
@@ -88,11 +90,12 @@ class Topic:
 
 
 class FoxgloveServer:
-    """Admits viewers, advertises the topics, and sends each viewer those it has subscribed to.
+    """Admits viewers, advertises the topics, and sends each viewer the topics of its subscriptions.
 
-    All methods except `status` belong to the asyncio loop that serves. `name` is that of the
-    server; `origins` are the web pages that may connect, as a browser writes them; programs send no
-    `Origin`. Nothing waits for a viewer that does not read: it misses messages, and is cut off.
+    All methods except `status` belong to the asyncio loop that serves. `name` is the name of the
+    server. `origins` are the web pages that may connect, as a browser writes them; programs send no
+    `Origin`. The server never waits for a viewer that does not read: the viewer misses messages and
+    is disconnected.
     """
 
     def __init__(self, name: str, origins: Collection[str]) -> None:
@@ -106,13 +109,13 @@ class FoxgloveServer:
         self._is_ending = False
         self._refused = 0
         self._refused_last = ""
-        # it writes lines for each client that sends nonsense, which could fill a disk
+        # the library logs lines for each client that sends invalid data, which could fill a disk
         self._logger = logging.getLogger(f"{__name__}.silent")
         self._logger.disabled = True
 
     @contextlib.asynccontextmanager
     async def serving(self, listener: socket.socket) -> AsyncIterator[None]:
-        """Admit viewers at `listener`, and cut all connections at the end."""
+        """Admit viewers at `listener`, and close all connections at the end."""
         async with serve(
             self._serve_viewer,
             sock=listener,
@@ -121,7 +124,7 @@ class FoxgloveServer:
             subprotocols=[PROTOCOL],
             process_request=self._check,
             process_response=self._on_response,
-            compression=None,  # it would keep 300 kB for each
+            compression=None,  # compression would need 300 kB per viewer
             server_header=None,
             open_timeout=_OPEN_S,
             close_timeout=1.0,
@@ -151,11 +154,13 @@ class FoxgloveServer:
             viewer.subscriptions.clear()
 
     def is_wanted(self, topic: Topic) -> bool:
-        """Whether a viewer has subscribed to it."""
+        """Whether a viewer has subscribed to the topic."""
         return any(topic.number in viewer.subscriptions for viewer in self._viewers)
 
     def send(self, topic: Topic, data: bytes, time_ns: int) -> None:
-        """Send a message, of `time_ns` since 1970, to subscribers that have read all others."""
+        """Send a message with the time `time_ns` since 1970 to subscribers that have read all
+        others.
+        """
         for viewer in self._viewers:
             number = viewer.subscriptions.get(topic.number)
             if number is not None and viewer.has_room():
@@ -170,8 +175,8 @@ class FoxgloveServer:
         }
 
     def admit(self, viewer: _Viewer) -> None:
-        """Take a new connection; if too many are open, the oldest silent one is cut off."""
-        if self._is_ending:  # the end would wait for it
+        """Accept a new connection; if too many are open, disconnect the oldest silent one."""
+        if self._is_ending:  # shutting down would wait for this viewer
             viewer.transport.abort()
         if len(self._handshaking) >= MOST_VIEWERS:
             oldest = next(iter(self._handshaking))
@@ -193,7 +198,7 @@ class FoxgloveServer:
             reason = f"Origin: {strange[0] or 'null'} is not allowed; see --live-origin"
         elif len(hosts) != 1 or not is_own_host(
             hosts[0], ()
-        ):  # on loopback no program needs a name
+        ):  # on loopback no program needs a host name
             given = ", ".join(hosts)
             reason = f"Host: {given}: allowed: localhost, or a numeric address"
         elif len(self._viewers) >= MOST_VIEWERS:
@@ -213,7 +218,7 @@ class FoxgloveServer:
 
     def _note(self, reason: str) -> str:
         self._refused += 1
-        # the library's older versions leave lone surrogates, which no answer can carry
+        # older versions of the library leave lone surrogates, which an answer cannot contain
         printable = reason.encode("utf-8", "backslashreplace").decode()
         self._refused_last = printable[:_MOST_REASON]
         return self._refused_last
@@ -254,12 +259,12 @@ class FoxgloveServer:
 
 
 class _Viewer(ServerConnection):
-    """A connection; it is cut off if it sends too much or reads too little."""
+    """A connection; it is closed if the viewer sends too much or reads too slowly."""
 
     def __init__(self, server: FoxgloveServer, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         self.subscriptions: dict[int, int] = {}
-        """The subscription to each topic, both as numbers."""
+        """Number of the subscription to each topic, by number of the topic."""
         self.is_greeted = False
         self._foxglove = server
         self._received = TokenBuckets(_MOST_RECEIVED_BYTES, _MOST_RECEIVED_BYTES)
@@ -270,7 +275,9 @@ class _Viewer(ServerConnection):
         broadcast([self], json.dumps(what))
 
     def has_room(self) -> bool:
-        """Whether there is room for a message; ends the connection if there was none for long."""
+        """Whether there is room for a message; ends the connection if there was no room for too
+        long.
+        """
         now_s = self.loop.time()
         if self.transport.get_write_buffer_size() <= _MOST_UNSENT_BYTES:
             self._kept_up_s = now_s
@@ -282,7 +289,7 @@ class _Viewer(ServerConnection):
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
         self._foxglove.admit(self)
-        # keep only some kilobytes of backlog here; more would be outdated when it is read
+        # keep a backlog of only some kilobytes; more would be outdated when the viewer reads it
         transport.get_extra_info("socket").setsockopt(
             socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES
         )
@@ -344,7 +351,7 @@ class CableScene:
         if not tension_N > self._slack[cable]:
             return _LOOSE
         low, high = self._low[cable], self._high[cable]
-        # even equal limits separate too little from too much
+        # with equal limits, tensions below and above still get different colours
         share = (
             float(np.interp(tension_N, (low, high), (0.0, 1.0)))
             if low < high
@@ -391,8 +398,8 @@ _COUNTS: Final = tuple(field.name for field in _SCALARS if field.kind != "<f8")
 class LiveView(Part):
     """Shows the newest row of a block `RATE_Hz` times a second to clients of `listener`.
 
-    Only subscribed topics are prepared. Clients cannot change anything. `origins` are the web
-    pages that may connect too.
+    Only subscribed topics are computed. Clients cannot change anything. `origins` are the web pages
+    that may also connect.
     """
 
     name = "live_view"
@@ -421,7 +428,8 @@ class LiveView(Part):
     def status(self) -> dict[str, Any]:
         """Return the URL to connect to, the number of rows shown, and the error.
 
-        Also how many viewers are connected, how many were refused, and the last reason.
+        Also returns the numbers of connected and rejected viewers, and the reason of the last
+        rejection.
         """
         figures = {"url": self._url, "moments": self._messages, "error": self._error}
         return {**figures, **self._server.status()}
@@ -497,12 +505,12 @@ class _Topics:
         return self._server.advertise(name, "json", published)
 
     def show_event(self, text: str, time_ns: int) -> None:
-        """Write a line into the log."""
+        """Show a line in the viewer's log."""
         line = Log(timestamp=_stamp(time_ns), level=LogLevel.Info, message=text, name="cdpr-rt")
         self._server.send(self._log, line.encode(), time_ns)
 
     def show(self, rows: Row, time_ns: int) -> None:
-        """Show the last of `rows`, and the longest times of all of them."""
+        """Show the last of `rows`, with the longest durations in all of them."""
         row = rows[-1]
         for topic, value in (
             (self._axes, self._axes_of),

@@ -19,22 +19,26 @@ MOST_IDLE_OF_PEER: Final = 32
 MOST_IDLE: Final = 256
 _LOOK_S: Final = 0.1
 IDLE_S, ANSWER_S, _CLOSE_S = 10.0, 90.0, 2.0
-"""Longest time in which a connection may request nothing, not take its answer, or not end."""
+"""Longest times for which a connection may send no request, not read its answer, or not end."""
 _READ_S: Final = 0.5
-"""A connection this young may have sent a request that was not read yet."""
+"""A connection that is younger may have sent a request that has not been read yet."""
 _MOST_UNSENT_BYTES: Final = 1 << 20
 _MOST_CONNECTIONS: Final = 1024
-"""If there are more, requests over TCP are answered with 503."""
+"""Largest number of connections; if there are more, requests over TCP are answered with 503."""
 _PIECE_BYTES: Final = 512
-"""Bytes read from a WebSocket in one go. The default is 256 kB: 40,000 pings, for some seconds."""
+"""Bytes read from a WebSocket in one call. The default of 256 kB holds 40,000 pings, which would
+occupy the event loop for some seconds."""
 _SEND_BUFFER_BYTES: Final = 1 << 16
-"""For a connection over TCP: a client that is further behind would read outdated data."""
+"""Largest unread backlog of a TCP connection; a client that is further behind would read outdated
+data."""
 _CLIENTS_MISTAKES: Final = ("Invalid UTF-8", "ASGI callable returned without completing")
-"""Beginnings of uvicorn errors that clients cause: invalid text, a rejected WebSocket."""
+"""First words of uvicorn's errors that clients cause: invalid text, a rejected WebSocket."""
 
 
 class Server(uvicorn.Server):
-    """Serves an application on one socket, in the caller's asyncio loop, under its signals."""
+    """Serves an application on one socket, in the caller's asyncio loop; leaves signals to the
+    caller.
+    """
 
     def __init__(self, app: AccessControl, listener: socket.socket) -> None:
         logging.getLogger("uvicorn.error").addFilter(_is_ours)
@@ -79,15 +83,15 @@ class Server(uvicorn.Server):
 
 def _is_ours(record: logging.LogRecord) -> bool:
     if record.exc_info and isinstance(record.exc_info[1], h11.LocalProtocolError):
-        return False  # a body that is not HTTP: uvicorn answers it before the application
+        return False  # the data are not HTTP: uvicorn answers before the application does
     return not str(record.msg).startswith(_CLIENTS_MISTAKES)
 
 
 async def _watch_connections(connections: set[Any]) -> None:
     """End connections that stay too long in one phase, and the oldest of too many idle ones.
 
-    uvicorn ends a connection that is silent after an answer, but not one that has never sent a
-    request, nor one that does not take its answer.
+    uvicorn ends a connection that is silent after an answer. It does not end a connection that has
+    never sent a request, or that does not read its answer.
     """
     loop = asyncio.get_running_loop()
     since: dict[Any, tuple[object, float]] = {}
@@ -108,7 +112,7 @@ async def _watch_connections(connections: set[Any]) -> None:
                 idle.append(one)
         idle.sort(key=lambda one: since[one][1], reverse=True)
         kept = Counter[Any]()
-        for one in idle:  # keep the newest
+        for one in idle:  # the newest connections stay
             peer = one.client and one.client[0]
             if kept[peer] >= MOST_IDLE_OF_PEER or kept.total() >= MOST_IDLE:
                 one.transport.abort()
@@ -120,7 +124,7 @@ def _phase(connection: Any) -> tuple[object, float]:
     """Return the present phase of a connection, and how long it may last."""
     if connection.transport.is_closing():
         return "closing", _CLOSE_S
-    if hasattr(connection, "handshake_complete"):  # a WebSocket; its pings end a silent one
+    if hasattr(connection, "handshake_complete"):  # a WebSocket: pings end it if it is silent
         return "open", float("inf") if connection.handshake_complete else IDLE_S
     cycle = connection.cycle
     if cycle is None or cycle.response_complete:

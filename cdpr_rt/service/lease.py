@@ -1,4 +1,4 @@
-"""The right to move: one client at a time holds it, and loses it if it is silent."""
+"""The right to move: one client at a time holds it, and loses it if it stops renewing it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SHORTEST_S: Final = 0.2
 
 
 class LeaseError(ControlError):
-    """The right to move is not this client's; the message names the holder."""
+    """This client does not hold the right to move; the message names the holder."""
 
 
 @dataclass(frozen=True)
 class Holder:
-    """Holder of the right to move, and how long it may stay silent."""
+    """Holder of the right to move, and the time within which it must renew the right."""
 
     client: str
     left_s: float
@@ -33,12 +33,12 @@ class LeaseRenewal:
     """Renewal of a lease."""
 
     number: int
-    """Number of the grant; commands with it are valid under this grant only."""
+    """Number of the grant; commands with this number are valid under this grant only."""
     ttl_s: float
 
 
 class Lease:
-    """Given to one client under a token; any thread may use it.
+    """Lease of the right to move, given to one client under a token; any thread may use it.
 
     `right` gives the loop the number of the grant and its expiry (CLOCK_MONOTONIC). The loop
     compares the expiry with its own clock, so it notices without a message that the holder, or
@@ -75,7 +75,7 @@ class Lease:
             return self._token
 
     def renew(self, token: str | None) -> LeaseRenewal:
-        """Extend it by its whole time; return the number of its grant and that time.
+        """Extend the lease by its full duration; return the number of the grant and that duration.
 
         Raises LeaseError if `token` is not, or is no longer, that of the holder.
         """
@@ -86,7 +86,7 @@ class Lease:
             return LeaseRenewal(self._right.number, self._ttl_ns * 1e-9)
 
     def release(self, token: str | None) -> None:
-        """Release it; a program that moves under it then holds. Raises like `renew`."""
+        """Release the right; a program that moves under it then holds. Raises like `renew`."""
         with self._lock:
             self._require(token)
             self._token = ""
@@ -106,9 +106,9 @@ class Lease:
             return same and self._left_s() > 0.0
 
     def find(self, digest: bytes, digest_of: Callable[[str], bytes]) -> str | None:
-        """Return the holder's token if `digest_of` makes `digest` of it, None otherwise.
+        """Return the holder's token if its `digest_of` equals `digest`, None otherwise.
 
-        For a second connection of the holder that does not send the token itself.
+        This identifies a second connection of the holder, which does not send the token itself.
         """
         with self._lock:
             held = self._left_s() > 0.0

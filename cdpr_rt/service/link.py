@@ -1,4 +1,4 @@
-"""The service's end of the shared memory: the loop's texts, and commands to it."""
+"""The service's end of the shared memory: texts from the loop, and commands to it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service.rows import PublishedText, WallClock
 
-# Event log of the daemon: states, reasons, commands, faults of its parts.
+# Event log of the daemon: states, reasons, commands, and faults of its parts.
 
 _KEPT: Final = 512
 _LONGEST: Final = 1000
 
 
 class EventLog:
-    """The last events; any thread adds and reads. Repeated events are counted, not stored again."""
+    """The last events; any thread may add and read. Repeated events are counted, not stored
+    again.
+    """
 
     def __init__(self, wall_ns: Callable[[], int]) -> None:
         self._wall_ns = wall_ns
@@ -33,7 +35,7 @@ class EventLog:
         self._number = 0
         self._lock = threading.Lock()
         self.listeners: list[Callable[..., None]] = []
-        """Called with the text, and the kind and the detail by name, for every event."""
+        """Function called for every event with the text, and with kind and details as keywords."""
 
     def add(self, kind: str, text: str, **detail: Any) -> None:
         """Add an event of a kind ("state", "reason", "command", "control", the name of a part)."""
@@ -59,7 +61,7 @@ class EventLog:
             listener(text, kind=kind, detail=detail)
 
     def since(self, number: int = 0, most: int = _KEPT) -> list[dict[str, Any]]:
-        """Return the events after a number, oldest first, at most the newest `most`."""
+        """Return the events after a given number, oldest first, limited to the newest `most`."""
         with self._lock:
             found = [dict(event) for event in self._events if event["number"] > number]
         return found[len(found) - min(most, len(found)) :]
@@ -73,11 +75,12 @@ _POLL_BUSY_S, _POLL_IDLE_S = 0.002, 0.05
 _MOST_PENDING = 32
 _SILENT_S = 5.0
 _COALESCED: Final = STOPS | {"acknowledge", "configure", "check"}
-"""Commands without arguments: if two clients send one at the same time, it is sent once."""
+"""Commands without arguments: if two clients send the same one at the same time, it is sent
+once."""
 
 
 class LoopGoneError(ControlError):
-    """No loop takes commands: it has not begun, has ended, or hangs."""
+    """The loop cannot take commands: it has not begun, has ended, or hangs."""
 
 
 class LoopBusyError(ControlError):
@@ -96,14 +99,14 @@ class Reply:
     text: str
     state: str
     refusal: dict[str, Any] | None = None
-    """Refusal as `CommandRefusal.as_json`, None if there is only a text."""
+    """The refusal in the form of `CommandRefusal.as_json`, None if there is only a text."""
 
 
 class LoopLink:
     """Commands with their replies, the loop's texts, and whether the loop is alive.
 
-    All of it belongs to one asyncio loop, in which `watch` runs; other threads may read `status`,
-    `description`, `state` and `wall_ns`.
+    Methods must be called in the asyncio loop in which `watch` runs; other threads may read
+    `status`, `description`, `state` and `wall_ns`.
     """
 
     def __init__(self, block: SharedBlock) -> None:
@@ -116,13 +119,13 @@ class LoopLink:
         self._wake = asyncio.Event()
         self._loop = _ProcessWatch()
         self._told = ("", "")
-        while block.take_reply() is not None:  # to a service that has ended
+        while block.take_reply() is not None:  # replies to a service that has ended
             pass
 
-    # -- from the loop
+    # -- data from the loop
 
     def status(self) -> dict[str, Any]:
-        """Return the loop's own status, {} before its first."""
+        """Return the status that the loop publishes, {} before the first one."""
         self._status.update()
         return self._status.value
 
@@ -148,12 +151,12 @@ class LoopLink:
         if not self.dead:
             return ""
         status = self.status()
-        # the launcher sees the exit status and writes it in place of the loop
+        # the launcher knows the exit status and writes the reason in place of the loop
         reason = str(status.get("reason", "")) if status.get("state") == DEAD else ""
         return reason or ENDED
 
     def silent_s(self) -> float:
-        """Return the time since the loop's last turn, 0 before its first."""
+        """Return the time since the loop's last iteration, 0 before the first."""
         alive_ns = int(self.block.counters["loop_alive_ns"][0])
         return max(0.0, (time.monotonic_ns() - alive_ns) * 1e-9) if alive_ns else 0.0
 
@@ -164,14 +167,15 @@ class LoopLink:
     # -- commands
 
     async def command(self, do: str, wait_s: float, **fields: Any) -> Reply:
-        """Send a command, return the loop's reply to it.
+        """Send a command; return the loop's reply to it.
 
         Raises LoopGoneError, LoopBusyError (also after `wait_s` without a reply) and
         CommandTooLongError.
         """
         self._require_loop()
         if do in STOPS:
-            # in this order: a stop that is not answered yet comes after all that may still start
+            # commands stay in order: a stop without a reply must come after all commands that may
+            # start motion
             self.block.void_commands()
             self._take_replies()
         future = self._coalesced.get(do)
@@ -216,12 +220,12 @@ class LoopLink:
         if self._coalesced.get(do) is done:
             del self._coalesced[do]
         if not done.cancelled():
-            done.exception()  # retrieved even if nobody waits any more
+            done.exception()  # retrieve the exception even if no client waits any more
 
     # -- background tasks
 
     async def watch(self) -> None:
-        """Take replies and record changes, until cancelled."""
+        """Read replies and record changes, until cancelled."""
         looked_s = 0.0
         while True:
             self._take_replies()
@@ -261,7 +265,9 @@ class LoopLink:
 
 
 class _ProcessWatch:
-    """Whether the loop's process runs, by a descriptor that cannot refer to a successor."""
+    """Shows whether the loop's process runs; its descriptor cannot refer to another process
+    later.
+    """
 
     def __init__(self) -> None:
         self._pid = self._fd = 0

@@ -15,13 +15,13 @@ _CREDENTIALS = struct.Struct("iII")
 
 
 class ListenError(ControlError):
-    """Listening at an address failed; the message says which and why."""
+    """The process cannot listen at an address; the message gives the address and the reason."""
 
 
 def listen_unix(path: Path) -> socket.socket:
     """Return a socket at `path` to which only this user may connect; raises ListenError.
 
-    The socket of a daemon that was killed is replaced, that of a daemon that answers is not.
+    The socket of a killed daemon is replaced; that of a daemon that answers is kept.
     """
     try:
         if path.exists() or path.is_symlink():
@@ -30,7 +30,7 @@ def listen_unix(path: Path) -> socket.socket:
             if listener_pid(path) is not None:
                 raise ListenError(f"socket {path}: another daemon listens there")
             path.unlink()
-    except OSError as error:  # another user's, in a folder where all may write
+    except OSError as error:  # it belongs to another user, in a folder that all users may write to
         raise ListenError(f"socket {path}: {error.strerror or error}") from None
     listener = socket.socket(socket.AF_UNIX)
     mask = os.umask(0o177)
@@ -49,7 +49,7 @@ def listen_tcp(host: str, port: int) -> socket.socket:
     """Return a socket at one address of `host`; raises ListenError."""
     listener = _bound(host, port, socket.SOCK_STREAM)
     try:
-        listener.listen()  # before that, another could bind the same
+        listener.listen()  # before this call, another process could bind the same address
     except OSError as error:
         listener.close()
         raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
@@ -57,16 +57,16 @@ def listen_tcp(host: str, port: int) -> socket.socket:
 
 
 def listen_udp(host: str, port: int, *, has_key: bool = False) -> socket.socket:
-    """Return a socket for a set-point stream at `host` and `port` (0: any free one).
+    """Return a socket for a set-point stream at `host` and `port` (0: any free port).
 
-    The stream's holder may be given a second socket at the same address. Raises ListenError, also
-    for an address that others can reach if there is no key.
+    The holder of the stream may later get a second socket at the same address. Raises ListenError,
+    also if other machines can reach the address and there is no key.
     """
     sock = _bound(host, port, socket.SOCK_DGRAM)
     if not has_key and not ipaddress.ip_address(sock.getsockname()[0]).is_loopback:
         sock.close()
         raise ListenError(f"{host}:{port}: others can reach it; give a key, or listen at 127.0.0.1")
-    # only now, so that nobody else who listens there goes unnoticed
+    # set after binding, so that binding fails if another process listens at this address
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
     return sock
 
@@ -94,7 +94,7 @@ def _bound(host: str, port: int, kind: socket.SocketKind) -> socket.socket:
 def listener_pid(path: Path) -> int | None:
     """Return the process that listens at the Unix socket `path`, None if none does.
 
-    It is 0 if the process is unknown: no right to connect, or too many clients waiting to.
+    Returns 0 if the process is unknown, because this user may not connect or too many clients wait.
     """
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)

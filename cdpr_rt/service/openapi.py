@@ -1,4 +1,5 @@
-"""Prints the description of the control interface, from which the page's types are made."""
+"""Print the OpenAPI description of the control interface, from which the page's types are
+generated."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
 PAGE_PREFIX: Final = "/page/"
-"""Path of everything that the page loads; it holds no facts about the robot."""
+"""Path of all files that the page loads; they contain no information about the robot."""
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"

@@ -1,4 +1,5 @@
-"""Base class of services beside the control interface: recorder, live view, stream."""
+"""Base class of the parts of the service besides the control interface: recorder, live view,
+stream."""
 
 from __future__ import annotations
 
@@ -9,14 +10,14 @@ from typing import Any
 
 
 class Part(ABC):
-    """Part with its own thread that the service starts, shows and stops.
+    """Part with its own thread, which the service starts, reports on and stops.
 
-    A part must not delay the others: it reports what it cannot do and continues without it. `ended`
-    is called with the reason if it ends without `stop`.
+    A part must not delay the others: it reports its failures and continues. If a part ends without
+    `stop`, it calls `ended` with the reason.
     """
 
     name: str
-    """A short word under which its figures are shown."""
+    """Short name of the part in the status."""
 
     def __init__(self, thread_name: str, ended: Callable[[str], None] | None) -> None:
         self._ended = ended
@@ -25,20 +26,20 @@ class Part(ABC):
         self._thread = threading.Thread(target=self._run, name=thread_name, daemon=True)
 
     def start(self) -> None:
-        """Begin; raises an error on failure, and the service continues without the part."""
+        """Begin; if this raises an error, the service continues without the part."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End within a second or two, with all data to keep on the disk."""
+        """End within two seconds; all recorded data must be on the disk then."""
         self._end.set()
         if self._thread.is_alive():
             self._thread.join()
 
     @abstractmethod
     def status(self) -> dict[str, Any]:
-        """Return what users need to know about it, as JSON; its numbers become metrics.
+        """Return the part's status for users, as JSON; its numbers become metrics.
 
-        Called from another thread, several times a second: no waiting, no I/O.
+        Another thread calls this several times a second, so it must not wait or do I/O.
         """
 
     @abstractmethod

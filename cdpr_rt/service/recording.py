@@ -32,7 +32,7 @@ from cdpr_rt.service.recording_file import NameTakenError, RecordingError, Recor
 from cdpr_rt.service.retention import Retention, size_text
 from cdpr_rt.service.rows import PublishedText, WallClock, plain
 
-# Rows of cycles as JSON texts, fast enough for every cycle of sixteen axes.
+# Rows of cycles as JSON texts, fast enough for every cycle of a robot with sixteen axes.
 
 _FLOAT, _INTEGER, _BOOLEAN, _NOTHING = 0, 1, 2, 3
 _KINDS: Final = {"f": _FLOAT, "i": _INTEGER, "u": _INTEGER, "b": _BOOLEAN}
@@ -45,7 +45,7 @@ Numbers = NDArray[np.int64]
 
 
 class RowTexts:
-    """Turns the fields `names` of rows for n axes into one JSON object each, in this order.
+    """Converts the fields `names` of each row for n axes into a JSON object, in this order.
 
     Numbers are rounded to 1e-9 of their unit; values that are not finite become null.
     """
@@ -124,9 +124,9 @@ def _write_float(out: Bytes, at: int, value: float) -> int:
             out[at] = code
             at += 1
         return at
-    size = min(abs(value), 1e308)  # rounding the last digit must not make it infinite
+    size = min(abs(value), 1e308)  # rounding of the last digit must not make the value infinite
     exponent = 0
-    while size >= 9e9:  # in billionths a larger one would not fit into 64 bits
+    while size >= 9e9:  # a larger value, in billionths, would not fit into 64 bits
         size /= 10.0
         exponent += 1
     billionths = int(size * 1e9 + 0.5)
@@ -193,10 +193,10 @@ def _write(
     return at
 
 
-# Events as text from recorded rows.
+# Events as text, found in recorded rows.
 
 FAILURE: Final = "failure"
-"""Kind of the event that a program failed; its text begins with the program's name."""
+"""Kind of the event of a failed program; its text begins with the name of the program."""
 _WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_buttons")
 
 
@@ -205,7 +205,7 @@ class EventDetector:
 
     In a status it finds reasons, and programs that failed.
 
-    Clamping is not an event, because it may come and go with every cycle.
+    Clamping is not an event, because it may begin and end in every cycle.
     """
 
     def __init__(self) -> None:
@@ -221,7 +221,7 @@ class EventDetector:
         self._axes = [axis.get("name", "") for axis in description.get("axes", [])]
 
     def of_status(self, status: dict[str, Any]) -> list[dict[str, Any]]:
-        """Return the failure and the reason of `status`, if they are new."""
+        """Return the events of the failure and the reason in `status`, if they are new."""
         reason, self._reason = self._reason, str(status.get("reason") or "")
         failure, self._failure = self._failure, str(status.get("failure") or "")
         events: list[dict[str, Any]] = []
@@ -232,7 +232,7 @@ class EventDetector:
         return events
 
     def of_state(self, status: dict[str, Any]) -> dict[str, Any] | None:
-        """Return a change of state that only `status` shows; to be called while no cycles run."""
+        """Return a change of state that only `status` shows; call it while no cycles run."""
         label = str(status.get("state") or "")
         if label in ("", self._label):
             return None
@@ -242,7 +242,7 @@ class EventDetector:
         return {"text": f"state {label}"}
 
     def of_rows(self, rows: Row) -> list[tuple[dict[str, Any], int]]:
-        """Return the changes within `rows` (m,) and since the last ones, with stamps."""
+        """Return the changes within `rows` (m,), and since the previous rows, with stamps."""
         if not rows.size:
             return []
         seen = np.stack([rows[name].astype(np.int64) for name in _WATCHED], axis=1)
@@ -256,7 +256,7 @@ class EventDetector:
         for k in np.flatnonzero((seen != before).any(axis=1)):
             words = self._words(before[k].tolist(), seen[k].tolist())
             if not words:
-                continue  # the state that a reaction leads to reports its end
+                continue  # the state after a reaction shows that the reaction has ended
             event = {
                 "text": words,
                 "cycle": int(rows["cycle"][k]),
@@ -295,7 +295,7 @@ _RESERVE_BYTES: Final = 64 << 20
 _RESERVE_PART: Final = 20
 _INTERVAL_S: Final = 0.1
 _SYNC_S: Final = 0.4
-"""With the interval and a disk of usual speed, at most the last second is lost."""
+"""With this interval and a disk of normal speed, at most the last second is lost."""
 _MOST_ROWS: Final = 4096
 _MOST_REMARKS: Final = 1000
 _PASSING: Final = ("since_ns", "count", "slowest_exchange_s", "url")
@@ -305,14 +305,13 @@ class Recorder(Part):
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, and the next file begins when one
-    has `most_bytes`. Before each file, recordings beyond `retention` are removed.
-    A disk that fails, or has less than `reserve_bytes` left (by default 64 MB, or a twentieth of a
-    small disk), ends the recording permanently: `status` gives the reason, `ended` is called with
-    it, and nothing else is affected.
-    A recorder that succeeds another one of the same block continues at the first row that was not
-    safe yet.
-    It has its own thread between `start` and `stop`. If recordings must depend on no clock but the
-    loop's, call `look` between `begin` and `finish` instead.
+    has `most_bytes`. Before each file, recordings beyond `retention` are removed. If the disk
+    fails, or has less than `reserve_bytes` left (by default 64 MB, or a twentieth of a small disk),
+    the recording ends permanently. `status` then gives the reason, `ended` is called with it, and
+    the rest of the service continues. A later recorder for the same block continues at the first
+    row that was not yet safe on the disk. The recorder has its own thread between `start` and
+    `stop`. If recordings must not depend on another clock than the loop's, call `begin`, `look` and
+    `finish` instead.
     """
 
     name = "recording"
@@ -369,7 +368,7 @@ class Recorder(Part):
             self._open()
 
     def look(self) -> None:
-        """Record everything new since the last call."""
+        """Record all rows and texts that are new since the last call."""
         if self._error:
             return
         with self._failing():
@@ -387,11 +386,11 @@ class Recorder(Part):
             self._close()
 
     def remark(self, text: str, **values: Any) -> None:
-        """Add a text for people to the events, with values for JSON; from any thread."""
+        """Add a text to the events, with JSON values; any thread may call this."""
         self._remarks.append(({"text": text, **values}, time.monotonic_ns()))
 
     def status(self) -> dict[str, Any]:
-        """Return figures: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
+        """Return the status: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
         file = self._file
         return {
             "recording": file is not None,
@@ -451,7 +450,9 @@ class Recorder(Part):
                 "version": version("cdpr-rt"),
             }
             self._path = self._folder / f"{session}-{part:03d}.mcap"
-            with suppress(NameTakenError):  # a daemon that began in the same second was faster
+            with suppress(
+                NameTakenError
+            ):  # another daemon began in the same second and took the name
                 self._file = RecordingFile(self._path, self._context, metadata)
         self._is_new_file = True
 
@@ -482,10 +483,12 @@ class Recorder(Part):
             self._file = None
 
     def _take(self) -> None:
-        """Log everything new since the last call."""
+        """Log all rows and texts that are new since the last call."""
         self._take_texts()
         before = self._rows
-        newest = int(self._block.counters["rows"][0])  # later rows wait, or this would never end
+        newest = int(
+            self._block.counters["rows"][0]
+        )  # later rows wait for the next call; otherwise this loop might never end
         while self._reader.next < newest:
             self._take_rows(self._reader.read(_MOST_ROWS))
         if self._rows == before and (event := self._events.of_state(self._told_status)):
@@ -518,7 +521,9 @@ class Recorder(Part):
         stamps = (rows["stamp_ns"] + self._wall.offset_ns).tolist()
         texts, timings = self._texts(rows), self._timing_texts(rows)
         for text, timing, stamp in zip(texts, timings, stamps, strict=True):
-            log_timing(timing, stamp)  # first: even a file cut short has it for each row
+            log_timing(
+                timing, stamp
+            )  # written first, so that even a truncated file has the timing of each row
             log(text, stamp)
         self._rows += rows.size
         for event, stamp_ns in self._events.of_rows(rows):
@@ -529,12 +534,12 @@ class Recorder(Part):
 
 
 def reserve_of(disk_bytes: int) -> int:
-    """Return the space to leave free on a disk of this size, for its other users."""
+    """Return the space to leave free on a disk of this size for other programs."""
     return min(_RESERVE_BYTES, disk_bytes // _RESERVE_PART)
 
 
 def _lasting(status: dict[str, Any]) -> dict[str, Any]:
-    """Return a status without values that are in rows, or differ by process and moment."""
+    """Return a status without values that rows contain, or that depend on process and time."""
     return {
         name: _lasting(value) if isinstance(value, dict) else value
         for name, value in status.items()
@@ -543,5 +548,5 @@ def _lasting(status: dict[str, Any]) -> dict[str, Any]:
 
 
 def _text(value: dict[str, Any]) -> bytes:
-    """Return strict JSON, whatever the value contains."""
+    """Return the value as strict JSON, for every content."""
     return json.dumps(plain(value), default=str).encode()

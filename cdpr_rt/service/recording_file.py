@@ -1,4 +1,4 @@
-"""One file of a recording: an MCAP that is complete after each synchronisation."""
+"""One file of a recording: an MCAP file that is complete after each synchronisation."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ PROFILE: Final = "cdpr-rt"
 """The MCAP profile, which identifies a file as a recording."""
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _CHUNK_BYTES: Final = 1 << 22
-"""Largest chunk after a large amount of data; readers hold a whole chunk in memory."""
+"""Largest chunk in a file with much data; readers keep a whole chunk in memory."""
 _DATA_END: Final = struct.pack("<BQI", 0x0F, 4, 0)
 _FOOTER_WITHOUT_SUMMARY: Final = struct.pack("<BQQQI", 0x02, 20, 0, 0, 0)
 _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
-"""End of a file without an index; readers then go through it from the beginning."""
+"""End of a file without an index; readers then read the file from the beginning."""
 
 
 class RecordingError(ControlError):
-    """The recording cannot continue; the message names the file and says why."""
+    """The recording cannot continue; the message gives the file and the reason."""
 
 
 class NameTakenError(RecordingError):
@@ -36,9 +36,9 @@ class NameTakenError(RecordingError):
 
 
 class _Held:
-    """Buffer that the MCAP writer writes to; never fails.
+    """Buffer that the MCAP writer writes to; writing never fails.
 
-    So no disk error can reach the library, which has no way to report it.
+    So the library never sees a disk error, which it could not report.
     """
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class _Held:
         self._at = 0
 
     def write(self, data: bytes | bytearray) -> int:
-        """Append."""
+        """Append data to the buffer."""
         self.data += data
         self._at += len(data)
         return len(data)
@@ -58,16 +58,16 @@ class _Held:
         return self._at
 
     def flush(self) -> None:
-        """Do nothing: the file is synchronised by its owner."""
+        """Do nothing, because `RecordingFile` synchronises the file."""
 
 
 class RecordingFile:
     """A new MCAP file at `path`; messages logged in `context` go into it.
 
     `sync` appends new data, ends the file as MCAP requires and waits for the disk to confirm it.
-    The data at the place of the previous end are written last. So after a kill or a power loss at
-    any time a reader finds an end, and all data that belong to it. Raises RecordingError if the
-    disk fails; the file is then in the state of the last `sync`, and closed.
+    The data that replace the previous end of the file are written last. So after a kill or a power
+    loss at any time, a reader finds a valid end and all data before it. Raises RecordingError if
+    the disk fails; the file is then in the state of the last `sync`, and closed.
     """
 
     def __init__(self, path: Path, context: Context, metadata: dict[str, str]) -> None:
@@ -85,7 +85,7 @@ class RecordingFile:
         except OSError as error:
             raise RecordingError(f"{path}: cannot record: {error.strerror}") from error
         self.size = 0
-        """Number of bytes that are safe, without the file's end."""
+        """Number of bytes that are safe on the disk, without the end of the file."""
         options = MCAPWriteOptions(
             compression=MCAPCompression.Zstd,
             compression_level=1,
@@ -106,18 +106,18 @@ class RecordingFile:
         return os.fstat(self._fd).st_nlink > 0
 
     def free_space(self) -> tuple[int, int]:
-        """Return the number of free bytes on its disk, and of all."""
+        """Return the number of free bytes on the file's disk, and of all its bytes."""
         usage = os.fstatvfs(self._fd)
         return usage.f_bavail * usage.f_frsize, usage.f_blocks * usage.f_frsize
 
     def sync(self) -> None:
-        """Make everything logged so far safe."""
+        """Write all data logged so far to the disk."""
         self._writer.flush()
         if self._held.data:
             self._put(_END)
 
     def close(self) -> None:
-        """Write the index and close, once; nothing can be logged into it afterwards."""
+        """Write the index and close the file, once; nothing can be logged afterwards."""
         if self._fd < 0:
             return
         self.sync()
@@ -144,7 +144,7 @@ class RecordingFile:
         self.size += len(data)
 
     def _give_up(self) -> None:
-        """Restore the data that were safe before, and their end."""
+        """Restore the data of the last `sync`, and their end."""
         try:
             if self.size:
                 _write_all(self._fd, _END, self.size)
@@ -152,7 +152,7 @@ class RecordingFile:
             else:
                 self.path.unlink(missing_ok=True)
         except OSError:
-            pass  # a reader that accepts a file cut short still reads it
+            pass  # a reader that accepts truncated files can still read it
         finally:
             self._close()
             self._writer.close()
@@ -160,7 +160,7 @@ class RecordingFile:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the names of the files in it safe; some file systems do not support it."""
+    """Write the file names in a folder to the disk; some file systems do not support this."""
     with suppress(OSError):
         fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -195,13 +195,13 @@ _KNOWN_OR_NOT = {"type": ["number", "null"]}
 
 
 def cycle_schema(n: int) -> dict[str, Any]:
-    """Return the schema of a row for n axes, without fields by wall-clock time."""
+    """Return the schema of a row for n axes, without fields that depend on wall-clock time."""
     about = "One cycle of the control loop; arrays over the axes, in SI units"
     return _row_schema("Cycle", about, CYCLE_FIELDS, n)
 
 
 def timing_schema() -> dict[str, Any]:
-    """Return the schema of a row's fields by wall-clock time."""
+    """Return the schema of a row's fields that depend on wall-clock time."""
     about = "When a cycle of the control loop ran, and how long it took, by wall-clock time"
     return _row_schema("Timing", about, TIMING_FIELDS, 1)
 
@@ -209,8 +209,8 @@ def timing_schema() -> dict[str, Any]:
 def _row_schema(title: str, about: str, names: Sequence[str], n: int) -> dict[str, Any]:
     """Return the schema of the fields `names` of a row for n axes.
 
-    Numbers may be null, which viewers do not expect in a schema: they read the plain `type` next to
-    `$ref`, which a validator of this draft has to ignore.
+    Numbers may be null, but viewers do not understand this in a schema. So each number has a plain
+    `type` next to `$ref`: viewers read it, and validators of this draft have to ignore it.
     """
     dtype = cycle_dtype(n)
     properties: dict[str, Any] = {}

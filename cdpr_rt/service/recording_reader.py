@@ -46,26 +46,26 @@ _BROKEN: Final = (
     TypeError,
     AttributeError,
     EOFError,
-    MemoryError,  # due to a damaged length
+    MemoryError,  # raised because of a damaged length
     OverflowError,
 )
 _MOST_CHUNK_BYTES: Final = 1 << 24
-"""Bytes of a chunk, compressed or not: the recorder closes one at a quarter of that."""
+"""Largest size of a chunk, compressed or not; the recorder closes a chunk at a quarter of this."""
 _MOST_RATIO: Final = 1000
-"""Content of the chunks over the size of a file: rows that differ only in time reach 400."""
+"""Largest ratio of uncompressed content to file size; rows that differ only in time reach 400."""
 _LEAST_BYTES: Final = 1 << 26
-"""Content that a file of any size may hold."""
+"""Uncompressed content that a file of any size may have."""
 _MOST_MESSAGE_BYTES: Final = 1 << 18
-"""Bytes of a description, a status or an event."""
+"""Largest size of a description, a status or an event."""
 _MOST_EVENTS: Final = 100_000
 _MOST_EVENT_BYTES: Final = 1 << 24
-"""Bytes of all events."""
+"""Largest size of all events."""
 _MOST_STATES: Final = 64
 _MOST_TIMINGS: Final = 100_000
 _MOST_TIMING_BYTES: Final = 1 << 25
-"""Bytes of timings whose rows have not arrived yet."""
+"""Largest size of timings whose rows have not been read yet."""
 _MOST_CHANNELS: Final = 64
-"""Channels, and schemas: a recording has five of each."""
+"""Largest number of channels and of schemas; a recording has five of each."""
 _TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
 _ALWAYS: Final = ("time_s", "stamp_ns")
 
@@ -76,38 +76,39 @@ CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
 
 
 class RecordingReader:
-    """One file; `cycles` reads it, all other attributes are known afterwards.
+    """One recording file; `cycles` reads it, and all other attributes are known after that.
 
-    Raises RecordingError if the file is missing or not a recording. Unreadable data end it like
-    the end of the file.
+    Raises RecordingError if the file is missing or not a recording. Unreadable data count as the
+    end of the file.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.metadata: dict[str, str] = {}
         self.part = 0
-        """Its number in its session, from 1."""
+        """Number of the file in its session, from 1."""
         self.offset_ns = 0
-        """Time of day minus stamp."""
+        """Difference between time of day and stamp."""
         self.description: dict[str, Any] = {}
-        """Robot's description as published last."""
+        """The last published description of the robot."""
         self.axes: list[str] = []
-        """Names of the axes, as far as the description has them."""
+        """Names of the axes, if the description has them."""
         self.states: set[str] = set()
         """States that appear in statuses."""
         self.events: list[dict[str, Any]] = []
-        """In the order of the file, each with `log_time_ns`, the time of day."""
+        """Events in the order of the file, each with `log_time_ns`, the time of day."""
         self.ended = CUT
-        """`CLOSED`; `KILLED` if its writer had no time to write the index; `CUT` if the file
-        breaks off."""
+        """`CLOSED`; `KILLED` if the writer could not write the index; `CUT` if the file is
+        truncated."""
         self.position = 0
         """Bytes read so far."""
         self._timings: list[bytes] = []
-        """Timing messages of rows that follow: a chunk may end between the two."""
+        """Timing messages whose rows follow, because a chunk may end between a timing and its
+        row."""
         self._held_bytes = self._event_bytes = 0
 
     def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
-        """Yield the rows, some hundred at a time; all fields or only `fields`."""
+        """Yield the rows in blocks of some hundred, with all fields or only `fields`."""
         channels: dict[int, Channel] = {}
         schemas: dict[int, Schema] = {}
         with self._open() as file:
@@ -154,9 +155,10 @@ class RecordingReader:
             raise RecordingError(f"{self.path}: not a recording: it does not name its robot")
 
     def _require_bounds(self, chunk: Chunk) -> None:
-        """Raise RecordingError for a chunk larger than a recorder writes.
+        """Raise RecordingError if a chunk is larger than a recorder writes.
 
-        ValueError if its sizes disagree: the library relies on the one in the compressed data.
+        Raises ValueError if its sizes disagree, because the library relies on the size in the
+        compressed data.
         """
         size = max(chunk.uncompressed_size, len(chunk.data))
         if chunk.compression == "zstd":
@@ -190,7 +192,7 @@ class RecordingReader:
         schemas: dict[int, Schema],
         fields: Collection[str] | None,
     ) -> Columns:
-        """Take in one chunk; return the rows in it, if any."""
+        """Read one chunk; return the rows in it, if any."""
         rows: list[bytes] = []
         for record in _records(chunk):
             if isinstance(record, Schema):

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Final
 
 BYTES_PER_AXIS: Final = 60.0
-"""Approximate bytes of an axis in a cycle: more in motion, less at rest."""
+"""Approximate number of bytes per axis and cycle: more in motion, less at rest."""
 _WRITTEN_S: Final = 60.0
-"""A file that was written this recently may belong to another daemon, and stays."""
+"""A file that was written within this time may belong to another daemon, so it is kept."""
 _DAY_S: Final = 86400.0
 _GAP_DAYS: Final = 30.0
 
 
 @dataclass(frozen=True)
 class Retention:
-    """Limits of a robot's kept recordings; if infinite, all are kept."""
+    """Limits of the recordings that are kept for a robot; if they are infinite, all are kept."""
 
     days: float = float("inf")
     total_bytes: float = float("inf")
@@ -28,9 +28,10 @@ class Retention:
     def prune(self, folder: Path, robot: str) -> list[Path]:
         """Remove recordings of this robot beyond the limits, the oldest first; return them.
 
-        Only files named as its recordings are considered. The newest stays, and so do files that
-        cannot be removed. Ages are relative to the last recording, and a gap that is longer than
-        `days` and 30 days counts as zero: correcting a wrong clock removes nothing.
+        Only files with the names of this robot's recordings are considered. The newest file stays,
+        and so do files that cannot be removed. Ages are relative to the last recording. A gap
+        longer than both `days` and 30 days counts as zero, so that the correction of a wrong clock
+        removes nothing.
         """
         found = sorted(_recordings(folder, robot), key=lambda one: one[1])
         total = sum(size for _, _, size in found)
@@ -47,7 +48,7 @@ class Retention:
         return removed
 
     def _ages(self, found: list[tuple[Path, float, int]]) -> list[float]:
-        """Return how much older than the last each recording is, s."""
+        """Return the age of each recording relative to the last one, s."""
         longest_s = max(self.days, _GAP_DAYS) * _DAY_S
         ages = [0.0] * len(found)
         for k in range(len(found) - 2, -1, -1):
@@ -67,7 +68,7 @@ def _recordings(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
 
 
 def size_text(count: float) -> str:
-    """Return a number of bytes as text, in a unit that leaves it at least 1."""
+    """Return a number of bytes as text, in the largest unit with a value of at least 1."""
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             return f"{count / size:.3g} {unit}"

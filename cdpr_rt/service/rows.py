@@ -1,4 +1,4 @@
-"""Content of a block as plain JSON: its newest row, its texts; and the time of day."""
+"""Content of a block as plain JSON: its newest row and its texts; and the time of day."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LABELS: Final = {
     for field in FIELDS.values()
     if field.labels is not None
 }
-"""Names of the numbers of some fields."""
+"""For fields that contain numbers of states and the like: the names of these numbers."""
 _STATUS_FIELDS: Final = (*SCALARS, "pose")
 _AXIS_FIELDS: Final = tuple(field.name for field in AXIS_FIELDS if field.status)
 _DESCRIBED: Final = ("name", "bus", "node_id", "winch", "commissioned")
@@ -45,7 +45,9 @@ def plain(value: Any) -> Any:
 
 
 def row_table(row: Row, fields: Iterable[str] = FIELDS) -> dict[str, Any]:
-    """Return the fields of one row; arrays become lists, numbers the names that they stand for."""
+    """Return the fields of one row; arrays become lists, and numbers of states become their
+    names.
+    """
     table = {name: plain(row[name].tolist()) for name in fields}
     for name in LABELS.keys() & table.keys():
         table[name] = LABELS[name].get(table[name], "unknown")
@@ -53,7 +55,9 @@ def row_table(row: Row, fields: Iterable[str] = FIELDS) -> dict[str, Any]:
 
 
 def cycle_figures(block: SharedBlock, description: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `cycle` and `axes` of a status: the newest row as a whole, and axis by axis."""
+    """Return `cycle` and `axes` of a status: common values of the newest row, and values per
+    axis.
+    """
     row = newest_row(block)
     described = description.get("axes") or [{} for _ in range(block.n)]
     axes = [{key: axis.get(key) for key in _DESCRIBED} for axis in described]
@@ -66,7 +70,7 @@ def cycle_figures(block: SharedBlock, description: Mapping[str, Any]) -> dict[st
 
 
 class PublishedText:
-    """The `description` or the `status` that a loop publishes in a block, as read last."""
+    """The last `description` or `status` that was read from a loop's block."""
 
     def __init__(self, block: SharedBlock, name: str) -> None:
         self._version = block.counters[name]
@@ -75,21 +79,23 @@ class PublishedText:
         self.value: dict[str, Any] = {}
 
     def update(self) -> bool:
-        """Read it if it has changed; return whether it has."""
+        """Read the text if it has changed; return whether it has changed."""
         version = int(self._version[0])
         if version == self._seen:
             return False
         try:
             self.value = plain(self._read())
-        except (SharedBlockError, ValueError):  # its writer ended while writing it
+        except (SharedBlockError, ValueError):  # the writer ended while it wrote the text
             return False
         self._seen = version
         return True
 
 
 class WallClock:
-    """Converts CLOCK_MONOTONIC into the time of day, by one instant: later changes of the system
-    clock have no effect."""
+    """Converts CLOCK_MONOTONIC into the time of day.
+
+    Both clocks are compared only once, so later changes of the system clock have no effect.
+    """
 
     def __init__(self, block: SharedBlock) -> None:
         self.start_ns = int(block.counters["start_realtime_ns"][0]) or time.time_ns()

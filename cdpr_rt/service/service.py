@@ -24,13 +24,13 @@ from cdpr_rt.service.part import Part
 from cdpr_rt.service.rows import cycle_figures, plain
 from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
 
-# Planning of paths, in a separate process so that the service is not delayed.
+# Planning of paths, in a separate process so that it does not delay the service.
 
 _MOST_CHARS: Final = 2000
-"""Longest text of an error, because every `GET /path` repeats it."""
+"""Longest text of an error; it is limited because every `GET /path` repeats it."""
 
 Plan = Callable[[Path, dict[str, Any]], Awaitable[tuple[int, str]]]
-"""Plans a file with the given options; returns the exit status and a JSON text."""
+"""Function that plans a file with given options; returns the exit status and a JSON text."""
 
 
 class PlannerBusyError(ControlError):
@@ -42,9 +42,10 @@ class PathPlanRunner:
 
     def __init__(self) -> None:
         self.work: Plan | None = None
-        """Set by the owner of the robot's file; without it nothing can be planned."""
+        """The planner, set by the owner of the robot's file; without it nothing can be planned."""
         self.job: dict[str, Any] = {"number": 0, "planning": False, "error": None, "plan": None}
-        """The last job: `error` says why the robot cannot follow it, `plan` is its name if it can.
+        """The last job: `plan` is the name of the plan, or `error` the reason why the robot cannot
+        follow the path.
         """
         self._task: asyncio.Task[None] | None = None
         self._cancelled = ""
@@ -62,7 +63,7 @@ class PathPlanRunner:
         return self.job
 
     def cancel(self, why: str) -> None:
-        """Discard the path that is being planned, because of a stop request since."""
+        """Discard the path that is being planned, because a stop was requested."""
         if self.job["planning"]:
             self._cancelled = why
 
@@ -76,7 +77,7 @@ class PathPlanRunner:
             answer = _read(status, text.replace(str(file), request["name"]))
             if self._cancelled:
                 answer = {"error": f"not started: {self._cancelled} during planning"}
-        except TimeoutError:  # a kind of OSError, but without a text
+        except TimeoutError:  # a subclass of OSError, but without a text
             answer = {"error": "planning takes too long; divide the path"}
         except OSError as error:
             answer = {"error": f"cannot be planned: {error.strerror}"}
@@ -110,7 +111,7 @@ WAIT_S: Final = {
     "shutdown": 30.0,
     "program": 15.0,
 }
-"""Time-outs of replies; all other replies come within a few cycles."""
+"""Timeouts of slow replies; all other replies come within a few cycles."""
 _WAIT_S = 3.0
 
 
@@ -135,11 +136,11 @@ class Service:
         self.stream: SetpointStream | None = None
         """The running set-point stream, None if none is received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
-        """Figures of the service itself, shown as the part `service`."""
+        """Status values of the service itself, shown as the part `service`."""
         self.background: list[Callable[[], Coroutine[Any, Any, None]]] = []
-        """Further coroutines that run while the service does, until cancelled."""
+        """Further coroutines that run as long as the service, until cancelled."""
         self.http: tuple[str, int] | None = None
-        """Address at which it listens on TCP, None if it does not."""
+        """TCP address at which the service listens, None without TCP."""
         self.page_url = ""
         """Address of the page with its key, "" without a page."""
         self.end_daemon: Callable[[], None] = lambda: None
@@ -147,7 +148,8 @@ class Service:
         self.wake_launcher: Callable[[], None] = lambda: None
         """Resumes the launcher if it was stopped (SIGSTOP, Ctrl-Z)."""
         self.inject: Callable[[int, str], str] | None = None
-        """Breaks or mends a simulated axis and returns what it did; None for real drives."""
+        """Function that breaks or mends a simulated axis and returns a description; None for real
+        drives."""
         self.stops = 0
         """Number of stops that came past `/control`; they cancel the orders that wait there."""
         self._held_by = ""
@@ -155,11 +157,11 @@ class Service:
         self._stops_taken = int(self.link.status().get("stops", {}).get("taken", 0))
 
     def count_refusal(self) -> None:
-        """Count a request that was refused by the access control."""
+        """Count a request that the access control has rejected."""
         self.counts["refused"] += 1
 
     def start_parts(self, parts: Sequence[Part]) -> None:
-        """Start each part; if one cannot start, status and events give the reason."""
+        """Start each part; if a part cannot start, status and events give the reason."""
         for part in parts:
             try:
                 part.start()
@@ -209,19 +211,19 @@ class Service:
     ) -> Reply:
         """Send a command that needs the right to move; renew that right while it is carried out.
 
-        The right expires if the client has `gone` meanwhile. Raises LeaseError and the errors of
-        `LoopLink.command`.
+        The right expires if the client has `gone` during that time. Raises LeaseError and the
+        errors of `LoopLink.command`.
         """
         right = self.lease.renew(token).number
         keeping = asyncio.create_task(self._keep_right(token, gone))
         try:
-            # begun here, so that the client's next request comes after it
+            # begun here, so that the client's next request comes after this command
             return await self.command(do, client, right=right, **fields)
         finally:
             keeping.cancel()
 
     async def _keep_right(self, token: str | None, gone: Callable[[], Awaitable[bool]]) -> None:
-        with suppress(LeaseError):  # the same client has released it meanwhile
+        with suppress(LeaseError):  # the same client has released the right in the meantime
             while not await gone():
                 self.lease.renew(token)
                 await asyncio.sleep(_TURN_S)
@@ -245,7 +247,7 @@ class Service:
             if do == "shutdown":  # the loop needs no launcher to stop
                 self.wake_launcher()
         if reply is self._noted:
-            return reply  # many clients have sent the same
+            return reply  # the command was shared by many clients
         self._noted = reply
         if do != "set" or not reply.ok:
             result = "" if reply.ok else f": refused: {reply.text}"
@@ -290,7 +292,7 @@ class Service:
         return {"held": True, "client": holder.client, "left_s": holder.left_s}
 
     def part_figures(self) -> dict[str, dict[str, Any]]:
-        """Return the figures of each part, and of the service itself."""
+        """Return the status values of each part, and of the service itself."""
         where = None if self.http is None else f"{self.http[0]}:{self.http[1]}"
         figures: dict[str, dict[str, Any]] = {"service": {"http": where, **self.counts}}
         figures |= {name: {"error": text} for name, text in self._unstarted.items()}
@@ -317,7 +319,9 @@ class Service:
             await asyncio.sleep(_TURN_S / 4)
 
     def _note_stop(self) -> None:
-        """Record a stop that the loop took from its own socket, as one through the service."""
+        """Record a stop from the loop's own socket in the same way as a stop through the
+        service.
+        """
         stops = self.link.status().get("stops") or {}
         if (taken := stops.get("taken", 0)) == self._stops_taken:
             return

@@ -1,4 +1,4 @@
-"""UDP receiver of the set-point stream: a separate thread beside the rest of the service."""
+"""UDP receiver of the set-point stream, in a separate thread of the service."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ from cdpr_rt.service.stream_packet import (
     stream_key,
 )
 
-# Who may stream set-points and which of them are valid; uses bytes and time, but no socket.
+# Decision who may stream set-points, and which of them are valid; needs bytes and time, no socket.
 
 SILENCE_NS: Final = 1_000_000_000
-"""After this time without a set-point a session that began with the shared key ends."""
+"""A session that began with the shared key ends after this time without a set-point."""
 MOST_RATE_Hz: Final = 250.0
-"""Set-points per second accepted from one sender, on average."""
+"""Average number of set-points per second accepted from one sender."""
 BURST: Final = 50
-"""Set-points accepted in one burst, for example after a stall of the network."""
+"""Number of set-points accepted in one burst, for example after a network delay."""
 
 _WINDOW = 64
 _LONGEST_STEP = 1 << 20
@@ -65,7 +65,7 @@ Address = tuple[Any, ...]
 
 
 class Window:
-    """Window of received sequence numbers: each counts once, and old ones never."""
+    """Window of received sequence numbers: each number is accepted once, and old ones never."""
 
     def __init__(self) -> None:
         self.highest = -1
@@ -91,45 +91,47 @@ class Window:
 
 @dataclass
 class _Session:
-    """One sender's use of the stream, under one grant of the right to move."""
+    """Session of one sender, under one grant of the right to move."""
 
     name: int
     key: bytes
     token: str
-    """Token of the right, which the session renews."""
+    """Token of the right to move, which the session renews."""
     right: int
     """The number of the grant of that token."""
     given: bool
-    """Whether the control interface has given it to the holder; then silence does not end it."""
+    """Whether the control interface has given the session to the holder; then silence does not end
+    it."""
     own: bool = False
-    """Whether it has taken the right itself, and so releases it at its end."""
+    """Whether the session has taken the right itself, and so releases it at its end."""
     address: Address | None = None
     """Address of the first packet; packets from others are ignored."""
     over: bool = False
-    """Whether its right has ended: later packets are answered, but not used."""
+    """Whether the right of the session has ended: later packets are answered, but not used."""
     last_ns: int = 0
     credit: float = BURST
     window: Window = field(default_factory=Window)
 
     def is_of(self, name: int, address: Address) -> bool:
-        """Whether a packet with this session number, from there, belongs to it."""
+        """Whether a packet with this session number, from this address, belongs to the session."""
         return self.name == name and self.address in (None, address)
 
 
 class StreamSessionManager:
     """Receives packets, posts valid samples into `block`, and returns the answers.
 
-    One session holds the stream. The control interface gives it to the holder of the right to move
-    by `issue`, or it begins with a shared `key`; senders without either get no answer. It is bound
-    to one grant of the right and to the first address that uses it; after its end its packets are
-    not used. Any thread may use it. Raises ControlError for a key that is too short.
+    One session holds the stream. The control interface gives a session to the holder of the right
+    to move by `issue`, or a session begins with a shared `key`. Senders without either get no
+    answer. A session is bound to one grant of the right and to the first address that uses it.
+    After its end, its packets are not used. Any thread may use the manager. Raises ControlError for
+    a key that is too short.
     """
 
     def __init__(self, block: SharedBlock, lease: Lease, key: bytes | None = None) -> None:
         self.counts: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))
-        """Packets by outcome: names of `PacketFault`, of `Standing`, and greetings."""
+        """Numbers of packets by outcome: names of `PacketFault`, of `Standing`, and greetings."""
         self.round_trip_s = math.nan
-        """Round-trip delay of the newest set-point that reported it."""
+        """Round-trip delay, from the newest set-point that reported it."""
         self._block = block
         self._lease = lease
         self._key = None if key is None else stream_key(key)
@@ -157,7 +159,7 @@ class StreamSessionManager:
             return given
 
     def receive(self, data: bytes, address: Address, now_ns: int) -> bytes | None:
-        """Take one packet that came at `now_ns`; return the answer, None if none is due."""
+        """Process one packet received at `now_ns`; return the answer, or None."""
         with self._lock:
             self._expire(now_ns)
             try:
@@ -188,14 +190,14 @@ class StreamSessionManager:
             self._end()
 
     def _open(self, data: bytes, address: Address) -> tuple[Packet, bytes]:
-        """Return the packet and the key its tag was made with; raises PacketError."""
+        """Return the packet and the key of its tag; raises PacketError."""
         kind, name = peek(data)
         session = self._session
         if session is not None and session.is_of(name, address):
             return parse(data, session.key), session.key
         if self._key is None:
             raise PacketError(PacketFault.SESSION, f"session {name} is unknown")
-        # no limit of attempts: only forgers could use it up, and a tag cannot be guessed anyway
+        # attempts are not limited: forgers could use up a limit, and a tag cannot be guessed anyway
         greets = kind in (PacketKind.HELLO, PacketKind.WELCOME)
         key = self._key if greets else session_key(self._key, self._nonce, name)
         return parse(data, key), key
@@ -215,7 +217,7 @@ class StreamSessionManager:
                 self._renew_nonce()
             self.counts[standing.name.lower()] += 1
             return seal(self._state(packet, standing, now_ns), key)
-        self.counts["kind"] += 1  # an answer, which nobody should send to a robot
+        self.counts["kind"] += 1  # the packet is an answer, which no sender should send to a robot
         return None
 
     def _evaluate(
@@ -231,7 +233,8 @@ class StreamSessionManager:
                 return Standing.NO_RIGHT
         if session.address is None:
             session.address, session.last_ns = address, now_ns
-        # first: packets that others send again cost the holder nothing and keep nothing alive
+        # checked first, so that replayed packets neither use up the holder's rate nor renew its
+        # session
         if not session.window.take(packet.sequence):
             return Standing.REPEATED
         credit = session.credit + (now_ns - session.last_ns) * 1e-9 * MOST_RATE_Hz
@@ -244,7 +247,7 @@ class StreamSessionManager:
         except LeaseError:
             session.over = True
             if not session.given:
-                self._end()  # its sender greets again
+                self._end()  # the sender will greet again
             return Standing.NO_RIGHT
         self._post(packet, session, now_ns)
         return Standing.ACCEPTED
@@ -252,7 +255,9 @@ class StreamSessionManager:
     def _begin_with_key(
         self, packet: StreamSetpoint, key: bytes, address: Address
     ) -> _Session | None:
-        """Begin a session with the given right, or its own; None if it has none."""
+        """Begin a session under the right named in the packet, or under a new one; None if
+        impossible.
+        """
         own = packet.right == NO_RIGHT
         try:
             token = (
@@ -277,11 +282,13 @@ class StreamSessionManager:
     def _end(self) -> None:
         session, self._session = self._session, None
         if session is not None and session.own:
-            with contextlib.suppress(LeaseError):  # it has expired, or another client has taken it
+            with contextlib.suppress(
+                LeaseError
+            ):  # the right has expired, or another client has taken it
                 self._lease.release(session.token)
 
     def _renew_nonce(self) -> None:
-        """Replace the nonce: packets made with it can open no session later."""
+        """Replace the nonce, so that old packets cannot open a session later."""
         self._nonce = secrets.token_bytes(NONCE_BYTES)
 
     def _post(self, packet: StreamSetpoint, session: _Session, now_ns: int) -> None:
@@ -319,7 +326,7 @@ class StreamSessionManager:
 
 _TURN_S: Final = 0.01
 _MOST_A_TURN: Final = 100
-"""Packets taken in one turn of 10 ms; the kernel drops the rest of a flood."""
+"""Largest number of packets read in 10 ms; the kernel drops the rest of a flood."""
 _LOOK_S: Final = 0.1
 
 
@@ -328,11 +335,11 @@ class StreamError(ControlError):
 
 
 class SetpointStream(Part):
-    """Takes packets from `sock`, as `listen_udp` returns one, from `start` until `stop`.
+    """Reads packets from `sock`, made by `listen_udp`, from `start` until `stop`.
 
-    Set-points go into `block` while their sender has the right to move, which `lease` gives.
-    Without a `key` only sessions are served that `sessions.issue` has returned. Raises
-    ControlError for a key that is too short.
+    Set-points are written to `block` while their sender has the right to move, see `lease`. Without
+    a `key`, only sessions that `sessions.issue` has returned are served. Raises ControlError for a
+    key that is too short.
     """
 
     name = "stream"
@@ -350,7 +357,7 @@ class SetpointStream(Part):
         self._sock = sock
         host, port = sock.getsockname()[:2]
         self.address: tuple[str, int] = host, port
-        """The host and the port at which it listens."""
+        """Host and port at which the stream listens."""
         self._holders: _HoldersSocket | None = None
 
     def stop(self) -> None:
@@ -378,7 +385,8 @@ class SetpointStream(Part):
             socks = [first] if self._holders is None else [self._holders.sock, first]
             readable = _readable(socks)
             begin = time.monotonic()
-            # the holder's own socket first: a flood of others' packets does not delay it
+            # the holder's own socket comes first, so that a flood of other packets does not delay
+            # it
             taken = sum(self._take(sock, buffer) for sock in socks if sock.fileno() in readable)
             self.sessions.expire(time.monotonic_ns())
             self._follow_holder(first)
@@ -392,7 +400,7 @@ class SetpointStream(Part):
             except BlockingIOError:
                 return count
             except OSError:
-                continue  # the result of an earlier answer: nobody listens there now
+                continue  # error from an earlier answer: its receiver has gone
             answer = self.sessions.receive(bytes(buffer[:size]), address, time.monotonic_ns())
             if answer is not None:
                 with contextlib.suppress(OSError):
@@ -427,7 +435,8 @@ class _HoldersSocket:
 def _readable(socks: list[socket.socket]) -> set[int]:
     """Wait for packets for a moment; return the descriptors of sockets that have some.
 
-    By poll, because `select` fails at descriptors from 1024, which many connections reach.
+    It uses poll, because `select` fails for descriptors from 1024 on, which many connections can
+    reach.
     """
     poll = select.poll()
     for sock in socks:

@@ -1,4 +1,4 @@
-"""The sender's side of the set-point stream, for teleoperation and for tests."""
+"""Sender of the set-point stream, for teleoperation and tests."""
 
 from __future__ import annotations
 
@@ -30,16 +30,17 @@ from cdpr_rt.service.stream_packet import (
 
 _HELLO_AGAIN_S = 0.5
 _SILENCE_S = 2.5
-"""After this time without an answer, more than any round trip, a new session begins."""
+"""A new session begins after this time without an answer, which is longer than any round trip."""
 
 
 class StreamClient:
-    """Sends set-points to the robot at `host` and `port` and takes its answers; never waits.
+    """Sends set-points to the robot at `host` and `port` and receives its answers; never waits.
 
     `access` is the session from the control interface, or the key shared with the robot. With a
     key, `token` names a right to move that the caller already holds. Without `token` the stream
     requests the right itself. There is no thread: call `send` 30 to 60 times a second, and
-    `receive` between, or whenever `fileno` is readable. Raises OSError if there is no such host.
+    `receive` in between, or whenever `fileno` is readable. Raises OSError if the host does not
+    exist.
     """
 
     def __init__(
@@ -71,7 +72,9 @@ class StreamClient:
 
     @property
     def ready(self) -> bool:
-        """Whether set-points are sent: in a given session immediately, else after the greeting."""
+        """Whether set-points can be sent: with a given session immediately, otherwise after the
+        greeting.
+        """
         return bool(self._key)
 
     def fileno(self) -> int:
@@ -85,7 +88,7 @@ class StreamClient:
         scale: float = 1.0,
         buttons: int = 0,
     ) -> bool:
-        """Send one set-point; return False while the robot has not greeted yet, or is absent.
+        """Send one set-point; return False if the robot has not greeted yet, or is absent.
 
         `position_m` is (3,), `quaternion` (4,) w x y z of length 1.
         """
@@ -108,7 +111,7 @@ class StreamClient:
         return True
 
     def receive(self) -> list[StreamAnswer]:
-        """Return the answers that have arrived, in order; perhaps none."""
+        """Return the answers that have arrived, in order."""
         answers: list[StreamAnswer] = []
         while True:
             try:
@@ -116,7 +119,7 @@ class StreamClient:
             except BlockingIOError:
                 return answers
             except OSError:
-                continue  # nobody listens there, perhaps not yet
+                continue  # no process listens at that address, perhaps not yet
             now_ns = time.monotonic_ns()
             answer = self._open(data)
             if isinstance(answer, Welcome):
@@ -127,7 +130,7 @@ class StreamClient:
                 answers.append(answer)
 
     def close(self) -> None:
-        """Leave the stream to others."""
+        """Release the stream for other senders."""
         if self.ready:
             self._put(seal(Bye(self._session, self._sequence + 1), self._key))
         self._sock.close()
@@ -175,7 +178,7 @@ class StreamClient:
             self.round_trip_s = (now_ns - answer.sent_ns) * 1e-9
         refused = answer.standing in (Standing.BUSY, Standing.NO_RIGHT)
         if refused and self._shared:
-            # the robot's nonce is used up
+            # the robot has replaced the nonce
             self._begin_session()
             self._greeted_ns = now_ns
 
@@ -183,5 +186,5 @@ class StreamClient:
         try:
             self._sock.send(data)
         except OSError:
-            return False  # no buffer, no route, no receiver: the packet is lost
+            return False  # no buffer, route or receiver: the packet is lost
         return True

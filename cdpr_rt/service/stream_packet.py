@@ -26,7 +26,7 @@ NO_RIGHT: Final = bytes(RIGHT_BYTES)
 """Replaces the digest of a right to move if the sender holds none."""
 SMALLEST_KEY_BYTES: Final = 16
 REACH_M: Final = 20.0
-"""Longest plausible position, and longest plausible position times scale."""
+"""Largest plausible distance of a position, and of position times scale."""
 LARGEST_SCALE: Final = 100.0
 UNKNOWN_POSE: Final = (math.nan,) * 7
 """x y z in m and quaternion w x y z of a platform whose pose is unknown."""
@@ -41,7 +41,7 @@ _NORM_TOLERANCE = 0.1
 
 
 class PacketKind(IntEnum):
-    """Type of a packet; senders send the odd ones, the robot answers with the even ones."""
+    """Kind of a packet; senders send odd kinds, and the robot answers with even kinds."""
 
     HELLO = 1
     WELCOME = 2
@@ -57,11 +57,11 @@ class Standing(IntEnum):
     BUSY = 2
     """Another sender holds the stream."""
     NO_RIGHT = 3
-    """The right to move belongs to another client, or the named right has ended."""
+    """Another client holds the right to move, or the named right has ended."""
     TOO_FAST = 4
-    """More set-points per second than the robot accepts."""
+    """The sender sends more set-points per second than the robot accepts."""
     REPEATED = 5
-    """One with this sequence number was accepted before, or it comes far too late."""
+    """A set-point with this sequence number was accepted before, or this one is far too late."""
 
 
 class PacketFault(IntEnum):
@@ -75,13 +75,14 @@ class PacketFault(IntEnum):
     NOT_FINITE = 5
     ABSURD = 6
     UNSIGNED = 7
-    """It has no tag."""
+    """The packet has no tag."""
     SESSION = 8
-    """Its session does not exist, or it comes from another address than the session's."""
+    """The session does not exist, or the packet comes from another address than that of the
+    session."""
 
 
 class PacketError(ControlError):
-    """A packet has another format, or impossible content; `fault` is the check that failed."""
+    """A packet has a wrong format or impossible content; `fault` is the check that failed."""
 
     def __init__(self, fault: PacketFault, text: str) -> None:
         self.fault = fault
@@ -104,7 +105,7 @@ class Hello:
 
 @dataclass(frozen=True)
 class Welcome:
-    """The robot's nonce, from which the session's key follows, after the sender's."""
+    """The robot's nonce, which follows the sender's; the session's key is derived from it."""
 
     session: int
     nonce: bytes
@@ -126,7 +127,7 @@ class StreamSession:
 
 @dataclass(frozen=True)
 class StreamSetpoint:
-    """Pose of the leading hand: position in m, attitude as a unit quaternion w x y z."""
+    """Pose of the input device: position in m, orientation as a unit quaternion w x y z."""
 
     session: int
     sequence: int
@@ -136,13 +137,13 @@ class StreamSetpoint:
     scale: float = 1.0
     buttons: int = 0
     echo_ns: int = 0
-    """`robot_ns` of the newest answer, 0 before one came."""
+    """`robot_ns` of the newest answer, 0 before the first answer."""
     echo_held_ns: int = 0
     """Time from that answer's arrival until this packet was sent."""
     right: bytes = NO_RIGHT
     """First bytes of the SHA-256 of the token that gives the right to move.
 
-    Used if a session begins with the shared key; a given session has its right already.
+    It is used if a session begins with the shared key; a given session already has a right.
     """
 
     def pack(self) -> bytes:
@@ -163,9 +164,9 @@ class StreamAnswer:
     sequence: int
     """Sequence number of the set-point that is answered."""
     sent_ns: int
-    """Time of that set-point by the sender's clock."""
+    """Time of the set-point by the sender's clock."""
     robot_ns: int
-    """Time of its arrival by the robot's clock."""
+    """Time of arrival of the set-point by the robot's clock."""
     state: int = 0
     """Number of the loop's state, see `LoopState`."""
     program: int = 0
@@ -176,7 +177,7 @@ class StreamAnswer:
     pose: tuple[float, ...] = UNKNOWN_POSE
     pose_setpoint: tuple[float, ...] = UNKNOWN_POSE
     round_trip_s: float = math.nan
-    """Round-trip delay as the robot measured it last."""
+    """Round-trip delay, as last measured by the robot."""
 
     def pack(self) -> bytes:
         """Return the packet without its tag."""
@@ -189,7 +190,7 @@ class StreamAnswer:
 
 @dataclass(frozen=True)
 class Bye:
-    """A sender leaves the stream to others."""
+    """A sender releases the stream for others."""
 
     session: int
     sequence: int
@@ -211,7 +212,9 @@ LONGEST_BYTES: Final = max(_SIZES.values()) + TAG_BYTES
 
 
 def peek(data: bytes) -> tuple[PacketKind, int]:
-    """Return kind and session of a packet whose head and length are right; raises PacketError."""
+    """Return kind and session of a packet after a check of header and length; raises
+    PacketError.
+    """
     if len(data) < _HEAD.size:
         raise PacketError(PacketFault.SIZE, f"{len(data)} bytes are not a packet")
     magic, version, number, _, session = _HEAD.unpack_from(data)
@@ -251,7 +254,7 @@ def seal(packet: Packet, key: bytes) -> bytes:
 
 
 def stream_key(shared: bytes) -> bytes:
-    """Return the stream's own key, derived from a shared key of any use.
+    """Return the key of the stream, derived from a shared key for any use.
 
     Raises ControlError for a key that is too short.
     """
@@ -263,7 +266,7 @@ def stream_key(shared: bytes) -> bytes:
 
 
 def session_key(key: bytes, robot_nonce: bytes, session: int) -> bytes:
-    """Return the key of one session: useless once the robot has another nonce."""
+    """Return the key of one session, which is void after the robot has replaced its nonce."""
     return hmac.digest(key, robot_nonce + session.to_bytes(4, "little"), "sha256")
 
 

@@ -1,4 +1,4 @@
-"""WebSockets: live figures, and the right to move for as long as a connection lives."""
+"""WebSockets: live values, and the right to move for as long as a connection lasts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cdpr_rt.service.link import Reply
 from cdpr_rt.service.rows import newest_row, row_table
 from cdpr_rt.service.service import Service
 
-# The WebSocket of `/control`: the right to move for as long as the connection lives.
+# The WebSocket of `/control`: the right to move for as long as the connection lasts.
 
 BUSY, REFUSED, SILENT, UNFIT = 1013, 4409, 4408, 1008
 """Codes with which a connection is closed, in addition to the usual ones."""
@@ -49,8 +49,8 @@ _SET: Final = TypeAdapter(models.Set)
 class ControlSocket:
     """One accepted connection of `client`, which holds the right under `token`.
 
-    Orders are carried out one after the other, except `hold`: it overtakes all of them. Orders that
-    have not begun when somebody stops the robot are rejected.
+    Orders are carried out one after the other, except `hold`, which overtakes all others. Orders
+    that have not begun when somebody stops the robot are rejected.
     """
 
     def __init__(
@@ -65,7 +65,9 @@ class ControlSocket:
         self._reading: asyncio.Task[tuple[int, str] | None] | None = None
 
     async def run(self) -> None:
-        """Obey until the client is gone, silent or sends too much; then release the right."""
+        """Carry out orders until the client has gone, is silent or sends too much; release the
+        right.
+        """
         held = {"kind": "held", "token": self._token, "ttl_s": self._ttl_s}
         working = asyncio.create_task(self._work())
         try:
@@ -77,18 +79,18 @@ class ControlSocket:
         finally:
             tasks = [working, *self._holds, *([self._reading] if self._reading else [])]
             unfinished = [task for task in tasks if task.cancel()]
-            with suppress(LeaseError):  # it has expired, or belongs to another client by now
+            with suppress(LeaseError):  # the right has expired, or another client has it now
                 self._service.lease.release(self._token)
             await asyncio.gather(*unfinished, return_exceptions=True)
         if working not in unfinished:
-            working.result()  # raises the exception that ended it
+            working.result()  # raises the exception that ended the task
         if reading in unfinished or reading.cancelled():
             return
         if end := reading.result():
             await self._socket.close(*end)
 
     async def _read(self) -> tuple[int, str] | None:
-        """Take messages until the end; return code and reason to close a live connection with."""
+        """Read messages until the end; return code and reason for closing a live connection."""
         messages = TokenBuckets(_MESSAGES_PER_S, _MESSAGES_PER_S)
         while True:
             try:
@@ -148,7 +150,7 @@ class ControlSocket:
                 await self._reply(id=order.id, ok=False, **why)
 
     async def _do(self, order: Order) -> tuple[str, Reply | None]:
-        """Return the loop's state, and its refusal if it refused."""
+        """Return the loop's state, and its reply if it rejected the order."""
         service, client, token = self._service, self._client, self._token
         if order.do == "renew":
             service.lease.renew(token)
@@ -179,7 +181,7 @@ class ControlSocket:
         except TimeoutError:
             if self._reading is not None:
                 self._reading.cancel()  # ends the connection
-        except WebSocketDisconnect:  # the reader notices it too
+        except WebSocketDisconnect:  # the reader also notices this
             return
 
 
@@ -189,11 +191,13 @@ def reason(text: str) -> str:
 
 
 async def send(socket: WebSocket, text: str) -> None:
-    """Send; raises TimeoutError if the other side does not read."""
+    """Send a text; raises TimeoutError if the other side does not read."""
     async with asyncio.timeout(_SLOW_S):
         try:
             await socket.send_text(text)
-        except RuntimeError:  # the server has closed it, because a ping was not answered
+        except (
+            RuntimeError
+        ):  # the server has closed the connection, because a ping was not answered
             raise WebSocketDisconnect from None
 
 
@@ -202,7 +206,7 @@ def _first_of(error: ValidationError) -> str:
 
 
 async def _is_here() -> bool:
-    """Return False, not gone: if the client leaves, its pending requests are cancelled."""
+    """Return False for "not gone", because pending requests are cancelled if the client leaves."""
     return False
 
 
@@ -282,13 +286,13 @@ class WebSocketRoutes:
             gone.cancel()
 
     def _cycle(self, updates: _Updates, fields: tuple[str, ...]) -> str:
-        """Return the newest cycle as text, "" if it has been sent already."""
+        """Return the newest cycle as text, "" if it was sent before."""
         rows = int(self._service.block.counters["rows"][0])
         if rows == updates.rows:
             return ""
         skipped, updates.rows = rows - updates.rows - 1, rows
         key = (rows, fields)
-        if self._cached[0] != key:  # many clients may view the same
+        if self._cached[0] != key:  # many clients may view the same fields
             row = newest_row(self._service.block)
             table = {} if row is None else row_table(row, fields)
             self._cached = key, json.dumps(table)[1:]

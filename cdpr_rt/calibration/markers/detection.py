@@ -53,7 +53,7 @@ class EdgeFit:
 
 
 def fit_corners(pixels: NDArray[np.uint8], corners: FloatArray, squares: int) -> EdgeFit:
-    """Return refined `corners` (k, 4, 2) of markers that are `squares` wide, with border."""
+    """Refine the `corners` (k, 4, 2) of markers that are `squares` wide, including the border."""
     good: BoolArray = np.ones(len(corners), np.bool_)
     width = np.zeros(len(corners))
     for _ in range(_PASSES):

@@ -227,7 +227,7 @@ class Coverage:
         return [one for one in self.islands[1:] if set(one) - set(self.seldom)]
 
     def lines(self) -> list[str]:
-        """Return the share of seen markers and what to do, as text."""
+        """Return lines of text: the share of seen markers, and advice."""
         share = self.share_seen
         many = len(self.ids) if share is None else f"{share:.0%} of the"
         return [f"{many} markers seen", *self.advice]

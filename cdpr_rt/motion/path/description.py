@@ -1,4 +1,4 @@
-"""A path as in its file: moves one after the other, each with its line in the file."""
+"""A path as described in its file: a sequence of moves, each with its line in the file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from cdpr_rt.errors import InvalidRequestError
 MOST_MOVES: Final = 200_000
 _MOST_CHARS: Final = 1000
 _MOST_PROBLEMS: Final = 40
-"""Most lines of an error message, one for each problem."""
+"""Largest number of lines in an error message, one for each problem."""
 LONGEST_DWELL_s: Final = 3600.0
 
 
 class PathError(InvalidRequestError):
-    """A path that cannot be followed; the message has file, line, value and allowed values."""
+    """A path cannot be followed; the message gives file, line, value and allowed values."""
 
     def __init__(self, source: Path | str, line: int, problem: str) -> None:
         lines = problem.split("\n")[:_MOST_PROBLEMS]
@@ -35,7 +35,8 @@ class Coordinates:
     """Entries of a position (d,) of a path by name, coordinates first."""
 
     names: tuple[str, ...]
-    """Some of x y z rx ry rz, or x y angle; rotations are the vector from the one at home."""
+    """Names out of x y z rx ry rz, or x y angle; rx ry rz is the rotation vector from home's
+    orientation."""
     reference: FloatArray
     """Target of G28, (d,)."""
 
@@ -52,7 +53,8 @@ class Arc:
     centre_m: FloatArray
     """A point of the axis, (3,), or (2,) if the axis is along z."""
     angle_rad: float
-    """Positive counter-clockwise, seen against the normal; more than a turn is several turns."""
+    """Angle, positive counter-clockwise if seen against the normal; it may be more than one
+    turn."""
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     """Direction of the axis, a unit vector (3,)."""
 
@@ -66,26 +68,26 @@ class Arc:
 
 @dataclass(frozen=True)
 class Move:
-    """One move to a position, and what happens there."""
+    """One move to a position, with its speed and the stop or wait at its end."""
 
     line: int
-    """In the file."""
+    """Line in the file."""
     end: FloatArray
     """(d,), m and rad."""
     speed: float
-    """Largest wanted speed, m/s; rad/s for a pure rotation. Infinite: as the robot allows."""
+    """Largest wanted speed, m/s; rad/s for a pure rotation; infinite for the robot's limit."""
     blend_m: float = 0.0
-    """The corner at its end may be cut within this distance of it."""
+    """Blending radius: the corner at the end may be cut within this distance."""
     dwell_s: float = 0.0
-    """Time at rest at its end."""
+    """Time at rest at the end of the move."""
     waits: bool = False
-    """Whether it waits at its end for a command to continue."""
+    """Whether the path waits at the end of the move for a command to continue."""
     arc: Arc | None = None
 
 
 @dataclass
 class PathDescription:
-    """Moves from a first position on."""
+    """A path: its first position, and the moves from there on."""
 
     source: str
     coordinates: Coordinates
@@ -96,7 +98,7 @@ class PathDescription:
     notices: list[str] = field(default_factory=list)
     """Notes for the user about how the file was read."""
     in_room: bool = False
-    """Whether the file names positions in the room (G53), not from its own zero."""
+    """Whether the file gives positions in the room (G53) instead of relative to its own zero."""
 
     def add(self, move: Move) -> None:
         """Append a move; raises PathError if there are too many or it is impossible."""
@@ -113,11 +115,13 @@ class PathDescription:
 
     @property
     def lines(self) -> list[int]:
-        """Their lines in the file."""
+        """Lines of these positions in the file."""
         return [self.start_line, *(move.line for move in self.moves)]
 
     def index_of(self, line: int) -> int:
-        """Return the first move from a line of the file on; raises PathError for no move."""
+        """Return the first move at or after a line of the file; raises PathError if there is
+        none.
+        """
         for i, move in enumerate(self.moves):
             if move.line >= line:
                 return i

@@ -1,6 +1,6 @@
 """G-code as a path: lines, arcs, drilling cycles, feeds, offsets, dwells and stops.
 
-The codes are those of RS274/NGC that have a meaning for a platform without a tool.
+Supported are the codes of RS274/NGC that have a meaning for a platform without a tool.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ _MODES: Final[dict[str, tuple[str, Any]]] = {
     "G98": ("back_to_level", True), "G99": ("back_to_level", False),
     "G61": ("blend_m", 0.0), "G61.1": ("blend_m", 0.0),
 }  # fmt: skip
-"""State that codes set."""
+"""Modal state that codes set."""
 _AXES: Final = frozenset("XYZABCUVW")
 _CENTRES: Final = "IJK"
 _WHY: Final = {
@@ -138,11 +138,11 @@ class GcodeSettings:
     blend_m: float = 1e-3
     """Default tolerance of cut corners (G61, G64 P)."""
     ignored: frozenset[str] = frozenset()
-    """Letters that are dropped, and M codes whose lines are skipped."""
+    """Letters to drop, and M codes whose lines to skip."""
     origins_m: dict[str, FloatArray] = field(default_factory=dict)
     """Positions of the zeros of G55 to G59."""
     z_m: float | None = None
-    """Z of a file without Z."""
+    """Z coordinate for a file without Z."""
     placement: FloatArray = field(default_factory=lambda: np.eye(3))
     """Scale, rotation and mirroring of the file, (3, 3): a multiple of an orthogonal matrix."""
     dwell_unit_s: float = 1.0
@@ -151,12 +151,12 @@ class GcodeSettings:
 
 @dataclass
 class _State:
-    """Modal state; lengths in m, positions in the coordinates of the file's zero (d,)."""
+    """Modal state; lengths are in m, and positions (d,) are relative to the file's zero."""
 
     here: FloatArray
-    """Entries are nan before the file names them."""
+    """Present position; entries are nan before the file names them."""
     offset: FloatArray
-    """Of G92: the file's X is `here` less this."""
+    """Offset of G92: the file's X is `here` minus this."""
     kept_offset: FloatArray
     blend_m: float
     motion: str = "G0"
@@ -167,11 +167,11 @@ class _State:
     system: str = "G54"
     inverse_time: bool = False
     feed: float = math.nan
-    """As given, per minute."""
+    """Feed as given in the file, per minute."""
     feed_unit_m: float = _MM_m
-    """Unit of the feed: that of the line with F."""
+    """Unit of the feed, which is the unit of the line with F."""
     back_to_level: bool = True
-    """Whether drilling ends at the height where it began (G98)."""
+    """Whether a drilling cycle ends at the height at which it began (G98)."""
     level_m: float = math.nan
     drilling: dict[str, float] = field(default_factory=dict)
 
@@ -190,7 +190,7 @@ def read_gcode(
 
 
 class _LineError(Exception):
-    """Why a line cannot be followed."""
+    """A line cannot be followed; the message gives the reason."""
 
 
 class _Reader:
@@ -217,7 +217,7 @@ class _Reader:
         self._sign = float(np.sign(np.linalg.det(settings.placement[:k, :k])))
         self._path: PathDescription | None = None
         self._early: list[Move] = []
-        """Stops before the beginning of the path."""
+        """Stops that precede the beginning of the path."""
         self._long_dwells: list[tuple[int, float]] = []
         """Lines and seconds."""
         self._last = 0
@@ -236,11 +236,11 @@ class _Reader:
             missing = self._missing()
             why = f"{missing} is never given" if missing else "nothing moves"
             hint = ": give the height with --z" if missing == "Z" else ""
-            # a rejected line may contain it
+            # a rejected line may contain the missing coordinate
             if not found.problems:
                 found.refuse(self._last, f"{why}; allowed: a path through two positions{hint}")
         found.require_none()
-        assert self._path is not None  # there would be a problem
+        assert self._path is not None  # otherwise a problem would have been found
         if self._long_dwells:
             line, seconds = self._long_dwells[0]
             other = "ms" if self._settings.dwell_unit_s == 1.0 else "s"
@@ -253,7 +253,7 @@ class _Reader:
         return self._path
 
     def _execute(self, block: Block) -> None:
-        """Carry out one line, in RS274's order."""
+        """Execute one line, in the order that RS274 defines."""
         codes, words, state = block.codes, dict(block.words), self._state
         is_known = self._refuse_unknown(block, words)
         self._set_modes(codes, words)
@@ -281,7 +281,9 @@ class _Reader:
             self._stop(Move(block.line, self._room(state.here), math.inf, waits=True))
 
     def _refuse_unknown(self, block: Block, words: dict[str, float]) -> bool:
-        """Reject unknown codes and words, and remove these; return whether all codes are known."""
+        """Reject unknown codes and words, and remove unknown words; return whether all codes are
+        known.
+        """
         unknown = [code for code in block.codes if code not in _KNOWN]
         for code in unknown:
             problem = _WHY.get(code) or "is not supported"
@@ -324,7 +326,7 @@ class _Reader:
             state.feed = math.nan  # valid for one line only
         if "G64" in codes:
             given = words.pop("P", None)
-            words.pop("Q", None)  # a tolerance for leaving out points, which is not done here
+            words.pop("Q", None)  # tolerance for omitting points, which is not supported
             state.blend_m = self._settings.blend_m if given is None else given * state.unit_m
         for code in codes:
             if code in _SYSTEMS:
@@ -340,7 +342,7 @@ class _Reader:
         self._state.here = self._file(room)
 
     def _room(self, place: FloatArray) -> FloatArray:
-        """Return a position of the file's coordinates in the room, (d,)."""
+        """Convert a position from the file's coordinates to the room, (d,)."""
         turned = _times(self._turn, place) if self._moved else place
         return np.asarray(self._origins[self._state.system] + turned)
 
@@ -349,7 +351,7 @@ class _Reader:
         return _times(self._back, away) if self._moved else away
 
     def _value(self, words: dict[str, float], i: int) -> float:
-        """Return the word of a coordinate in m or rad, and remove it."""
+        """Remove the word of a coordinate and return its value in m or rad."""
         unit = self._state.unit_m if i < self._k else math.radians(1.0)
         return words.pop(self._letters[i]) * unit
 
@@ -357,7 +359,7 @@ class _Reader:
         return [i for i, letter in enumerate(self._letters) if letter in words]
 
     def _target(self, words: dict[str, float]) -> FloatArray:
-        """Return the position that the words name, (d,), and remove them."""
+        """Remove the words of coordinates and return the position that they give, (d,)."""
         state = self._state
         target = state.here.copy()
         for i in self._named(words):
@@ -397,7 +399,7 @@ class _Reader:
             value = self._value(words, i)
             if math.isfinite(state.here[i]):
                 state.offset[i] = state.here[i] - value
-            else:  # the machine's position before it has moved
+            else:  # refers to the machine's position before it has moved
                 state.here[i] = value
         state.kept_offset[:] = state.offset
         self._begin(self._last)
@@ -425,7 +427,7 @@ class _Reader:
         self._append(block.line, target, motion, arc)
 
     def _append(self, line: int, target: FloatArray, motion: str, arc: Arc | None = None) -> None:
-        """Go to `target`; the path begins when all coordinates are named."""
+        """Append a move to `target`; the path begins when all coordinates have been named."""
         state, path = self._state, self._path
         start, state.here = state.here, target
         if path is None:
@@ -435,7 +437,7 @@ class _Reader:
         path.add(Move(line, self._room(target), speed, state.blend_m, arc=arc))
 
     def _begin(self, line: int) -> None:
-        """Begin the path if all coordinates are named."""
+        """Begin the path if all coordinates have been named."""
         if self._path is not None or self._missing():
             return
         start = self._room(self._state.here)
@@ -541,18 +543,19 @@ class _Reader:
             self._lift(line, place, clear, "G0")
 
     def _lift(self, line: int, place: FloatArray, z_m: float, motion: str) -> None:
-        """Go to a place at another height."""
+        """Append a move to a position at another height."""
         target = place.copy()
         target[2] = z_m
         if (target != self._state.here).any():
             self._append(line, target, motion)
 
     def _to_reference(self, block: Block, words: dict[str, float]) -> None:
-        """Go to the reference position, through the named position if there is one."""
+        """Append a move to the reference position, through the named position if there is one."""
         state = self._state
         named = self._named(words) or list(range(len(self._letters)))
         for i in self._named(words):
-            # without a number, or relative to an unknown position: straight to the reference
+            # words without a number, or relative to an unknown position: go straight to the
+            # reference
             unknown = state.relative and not math.isfinite(state.here[i])
             if unknown or not math.isfinite(words[self._letters[i]]):
                 del words[self._letters[i]]
@@ -592,7 +595,7 @@ class _Reader:
         return " ".join(letter for letter, gone in zip(self._letters, unknown, strict=True) if gone)
 
     def _go_on_from(self, block: Block) -> None:
-        """Go to the position of a rejected line, so that later lines can be checked."""
+        """Continue from the end position of a rejected line, so that later lines can be checked."""
         state = self._state
         if state.relative or set(block.codes) & {"G28", "G53", *_OFFSETS}:
             return
@@ -604,7 +607,7 @@ class _Reader:
 
 
 def _on_all(placement: FloatArray, k: int, d: int) -> FloatArray:
-    """Return a placement (3, 3) of positions for all coordinates, (d, d).
+    """Extend a placement (3, 3) of positions to all coordinates, (d, d).
 
     A rotation vector turns with the path. If the path is mirrored, the rotation is reversed.
     """

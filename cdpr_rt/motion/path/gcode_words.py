@@ -1,4 +1,5 @@
-"""The lines of a G-code file: codes and words, without comments and words without meaning here.
+"""The lines of a G-code file: codes and words, without comments and words that have no meaning
+here.
 
 All faults of a file are collected in `Findings`, so that they are reported together.
 """
@@ -26,9 +27,9 @@ _QUERIES: Final = frozenset(("$", "$$", "$#", "$G", "$I", "$N", "$X", "?"))
 _MOST_DIGITS: Final = 40
 _LARGEST_VALUE: Final = 1e9
 _MOST_CHARS: Final = 4096
-"""Of a line, and ..."""
+"""Largest length of a line."""
 _MOST_LINES: Final = 1_000_000
-"""... lines of a file."""
+"""Largest number of lines in a file."""
 _MOST_TEXTS: Final = 20
 _REPEATED: Final = frozenset("GM")
 
@@ -36,9 +37,10 @@ IDLE_LETTERS: Final = frozenset("STHDE")
 _IDLE_CODES: Final = frozenset(
     ("G43", "M1", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M10", "M11", "M48", "M49")
 )
-"""For tools, spindles and coolants: they may share a line with a motion."""
+"""Codes for tools, spindles and coolants, which may share a line with a motion."""
 _ALONE: Final = frozenset(("M10", "M11", "M48", "M49"))
-"""Codes of clamps and overrides. Words beside them without a G code are not a motion."""
+"""Codes of clamps and overrides. Other words in a line with such a code and without a G code are
+not a motion."""
 _TEXTS: Final = frozenset(("M117", "M118"))
 _IDLE_LINES: Final = _TEXTS | {
     f"M{number}"
@@ -48,9 +50,9 @@ _IDLE_LINES: Final = _TEXTS | {
         221, 400, *range(500, 505), 569, 572, 593, 900, 905, 906, 907, 913, 914,
     )
 }  # fmt: skip
-"""For printers: heaters, fans, displays, and limits of another machine."""
+"""Codes for printers: heaters, fans, displays, and limits of another machine."""
 _NEVER: Final = frozenset(("M2", "M30", "M97", "M98", "M99", "M206"))
-"""Codes that end a file, call another or move its zero."""
+"""Codes that end a file, call another file or move its zero."""
 _WORDS_OF_MOTIONS: Final = frozenset("FGIJKLMNOPQR")
 
 
@@ -60,9 +62,10 @@ class Block:
 
     line: int
     codes: tuple[str, ...]
-    """Such as G1, G20, M2; in their order."""
+    """Codes such as G1, G20, M2, in their order in the line."""
     words: dict[str, float]
-    """By letter, in the units of the file; nan for a letter without a number."""
+    """Values of the other words by letter, in the units of the file; nan for a letter without a
+    number."""
 
 
 @dataclass
@@ -214,7 +217,7 @@ def _skips_line(name: str, line: str, ignored: frozenset[str]) -> bool:
 
 
 def _unreadable(line: str) -> str:
-    """Return why a line is not made of plain words; an empty text if it may be."""
+    """Return the reason why a line does not consist of words, or ""."""
     if "#" in line or "[" in line:
         return "parameters and expressions (#, [ ]) are not supported; allowed: numbers"
     if line[0] in "Oo":

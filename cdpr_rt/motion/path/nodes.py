@@ -1,7 +1,8 @@
 """A path as nodes along its length: positions with two derivatives, smooth between nodes.
 
-Corners are cut by curves of fifth order that have position, direction and curvature of both
-sides (Hermite interpolation), so that acceleration has no step at the start of a corner.
+Corners are cut by curves of fifth order (Hermite interpolation), whose ends have position,
+direction and curvature of the adjacent pieces. So the acceleration has no step at the start of a
+corner.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import numpy as np
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 
-# Lines and arcs of a path as arrays, and the corners between them that are cut. A length along
-# the path is weighted: ds² = |dp|² + (scale dφ)², a metre of an anchor point counts like a metre of
-# the origin, so that pure rotations have a length too.
+# Lines and arcs of a path as arrays, and the cut corners between them. Length along the path is
+# weighted: ds² = |dp|² + (scale dφ)². A metre of an anchor point counts like a metre of the origin,
+# so pure rotations also have a length.
 
 _NOTHING_m: Final = 1e-7
 _STRAIGHT_rad: Final = 1e-4
@@ -27,8 +28,8 @@ _CURVATURE_1_m: Final = 1e-6
 EXACT_m: Final = 5e-6
 """Largest distance from the programmed path in exact mode if only the curvature steps."""
 _BULGE: Final = 0.0108
-"""Largest distance between a step in curvature and the curve that replaces it, over the step and
-the square of the length that is replaced on each side."""
+"""Largest distance between a step in curvature and the curve that replaces it, divided by the step
+and by the square of the length replaced on each side."""
 _PROJECTIONS: Final = 3
 
 
@@ -54,18 +55,19 @@ class Pieces:
     """Largest wanted speed, m/s, or rad/s for pieces that only turn."""
     line: IntArray
     blend_m: FloatArray
-    """Tolerance of the corner at the end of each, 0 if the path is exact there."""
+    """Tolerance of the corner at the end of each piece, 0 if the path is exact there."""
     dwell_s: FloatArray
-    """Time at rest at the end of each."""
+    """Time at rest at the end of each piece."""
     waits: BoolArray
     stops: BoolArray
-    """Whether the path rests at the end of each."""
+    """Whether the path rests at the end of each piece."""
     cut: FloatArray
-    """Length cut off the end of each, and off the beginning of the next, for the corner."""
+    """Length cut off the end of each piece, and off the beginning of the next one, for the
+    corner."""
     k: int
     """Number of coordinates that are positions."""
     start_dwell_s: float
-    """Time at rest before the first of them."""
+    """Time at rest before the first piece."""
     start_waits: bool
 
     def at(self, i: IntArray, share: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -119,9 +121,9 @@ class Pieces:
 
 
 def pieces_of(path: PathDescription, scale: FloatArray) -> Pieces:
-    """Return the pieces of a path; `scale` (d,) is how many metres each coordinate counts for.
+    """Return the pieces of a path; `scale` (d,) is the length in m for a unit of each coordinate.
 
-    Stops of moves without length belong to the piece before. There may be no pieces.
+    Stops of moves without length belong to the previous piece. The result may have no pieces.
     """
     here, kept = path.start, []
     d, k = len(scale), path.coordinates.positions
@@ -162,11 +164,11 @@ def pieces_of(path: PathDescription, scale: FloatArray) -> Pieces:
 
 
 def _cut_corners(pieces: Pieces, scale: FloatArray) -> None:
-    """Write where the path stops, and by how much corners are cut.
+    """Write where the path stops, and the lengths by which corners are cut.
 
     The cut is at most the blending radius, and half of the pieces on both sides. A step of
-    curvature without a turn is a corner too, or the acceleration would have a step. In exact mode
-    it is cut by a length that bends the path by `EXACT_m`.
+    curvature without a turn is also a corner, because the acceleration would otherwise have a step.
+    In exact mode it is cut by a length that moves the path by `EXACT_m`.
     """
     m = len(pieces.length)
     every = np.arange(m)
@@ -191,25 +193,26 @@ _SPACING_m: Final = 0.01
 NODE_m: Final = 2.0 / np.pi * _SPACING_m
 """Distance between the nodes of a line."""
 _TURN_rad: Final = 0.08
-"""Largest turn between nodes, along a piece and around an arc."""
+"""Largest rotation between nodes, along a piece and around an arc."""
 _LEAST_m: Final = 5e-4
-"""Least cut of a corner that determines the spacing of nodes, to bound their number."""
+"""Least cut of a corner that affects the spacing of nodes, to limit their number."""
 MOST_NODES: Final = 1_000_000
-"""Most nodes of one path: their arrays, including those of planning, take about 1 kB each."""
+"""Largest number of nodes of one path; a node takes about 1 kB, including the arrays for
+planning."""
 _PLACES: Final = (0.25, 0.5, 0.75, 1.0)
 """Shares of an interval at which the path is compared with the file."""
 _MOST_CUTS: Final = 12
 """Largest number of times that the cut of a corner outside its tolerance is halved."""
 _AT_ONCE: Final = 50_000
 _AFTER_ALL: Final = 1e9
-"""Number of a corner's nodes: after all nodes of the piece."""
+"""Sort index of a corner's nodes, which come after all nodes of the piece."""
 _ROUNDING_m: Final = 1e-8
 _IN_CORNER: Final = 8
 """Intervals of a cut corner."""
 _FULLNESS: Final = 2.0
-"""Length of the derivative at both ends of a corner over the length cut there. With 2, a corner
-without a turn is a line at even speed; the inner two control points are 0.8 of the cut away
-from its ends, so that all of the curve is within the cut of the corner's point."""
+"""Ratio of the derivative at both ends of a corner to the length cut there. With 2, a corner
+without a turn is a line with constant derivative; the inner two control points are 0.8 of the cut
+away from its ends, so that all of the curve is within the cut of the corner's point."""
 _GAUSS: Final = (
     (0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0.15), 5.0 / 18.0),
 )  # fmt: skip
@@ -221,7 +224,7 @@ class PathNodes:
 
     coordinates: Coordinates
     scale: FloatArray
-    """(d,): how many metres each coordinate counts for."""
+    """Length in m for a unit of each coordinate, (d,)."""
     s: FloatArray
     """Length along the path, (N,); the end of a run and the start of the next have the same."""
     q: FloatArray
@@ -234,7 +237,7 @@ class PathNodes:
     line: IntArray
     """Line of the file, (N,)."""
     runs: IntArray
-    """First and last node of each, (r, 2)."""
+    """First and last node of each run, (r, 2)."""
     dwell_s: FloatArray
     """Time at rest after each run, (r,)."""
     waits: BoolArray
@@ -249,7 +252,8 @@ class PathNodes:
         return float(np.linalg.norm(np.diff(self.q[:, :k], axis=0), axis=1).sum())
 
     def between(self, share: float, begin: int = 0, end: int | None = None) -> FloatArray:
-        """Return the path at a share of each interval, those after the nodes begin to end - 1.
+        """Return the path at a share of each interval, for intervals after the nodes begin to end -
+        1.
 
         Nodes that end a run return their own position.
         """
@@ -265,20 +269,21 @@ class PathNodes:
 
 @dataclass(frozen=True)
 class _Places:
-    """Places of nodes (N,) on the pieces."""
+    """Where nodes (N,) are on the pieces."""
 
     piece: IntArray
-    """Its number; for a corner's node that of the piece before the corner."""
+    """Index of the piece; for a corner's node that of the piece before the corner."""
     corner: BoolArray
     share: FloatArray
     """Share of the piece, or of the corner."""
 
 
 def nodes_of(path: PathDescription, scale: FloatArray) -> PathNodes:
-    """Return the nodes of a path with cut corners; a single one if the path leads nowhere.
+    """Return the nodes of a path with cut corners; a single node if the path has no length.
 
-    The curve through the nodes is compared with the file's lines and arcs. Corners that leave their
-    tolerance are cut by less. Raises PathError if the path still leaves it, or is too long.
+    The curve through the nodes is compared with the file's lines and arcs. Corners that exceed
+    their tolerance are cut by less. Raises PathError if the path still exceeds a tolerance, or is
+    too long.
     """
     pieces = pieces_of(path, scale)
     if not len(pieces.length):
@@ -333,7 +338,7 @@ def _nodes_of_pieces(
 
 
 def _resting_first(nodes: PathNodes, pieces: Pieces) -> PathNodes:
-    """Return the nodes after an additional run, which is a rest at the start of the path."""
+    """Return the nodes with an additional first run, which is a rest at the start of the path."""
     dwell_s = np.array([pieces.start_dwell_s])
     arrays = (nodes.s, nodes.q, nodes.first, nodes.second, nodes.speed, nodes.line)
     s, q, first, second, speed, line = (np.concatenate([one[:1], one]) for one in arrays)
@@ -389,7 +394,7 @@ def _along_pieces(pieces: Pieces, path: PathDescription) -> tuple[FloatArray, ..
     straight = pieces.angle_rad == 0.0
     apart_m = np.where(straight, NODE_m, _SPACING_m)
     count = np.ceil(np.maximum(left / apart_m, np.abs(pieces.angle_rad) / _TURN_rad))
-    # the first interval beside a corner is a quarter of the length cut there
+    # the first interval next to a corner is a quarter of the length cut there
     cuts = np.stack([cut_before, pieces.cut])
     narrow = np.maximum(np.where(cuts > 0.0, cuts, np.inf).min(axis=0), _LEAST_m)
     beside = np.ceil(np.pi * np.sqrt(np.maximum(left, 0.0) / narrow))

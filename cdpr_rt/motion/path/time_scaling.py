@@ -1,11 +1,10 @@
 """Time along a path: as fast as speeds, accelerations, jerks and tensions allow, at rest in stops.
 
-Each run between two stops is scaled by the passes of `time_scaling_kernel`. Its motion is then
-averaged over time so that its acceleration has no steps. The average is too fast at places that
-were slow for a moment only. These are slowed down and the run is scaled again, until all samples
-of the smoothed motion keep all limits, and the set-point stays on the path between the samples.
-Any small remaining excess is removed by slowing the run as a whole, which breaks no limit that
-was kept.
+The passes of the scaling kernel scale each run between two stops. The motion is then averaged over
+time, so that its acceleration has no steps. The average is too fast at positions at which the
+motion was slow for a moment only. These are slowed down and the run is scaled again, until all
+samples of the smoothed motion keep all limits, and the set-point stays on the path between samples.
+A small remaining excess is removed by slowing the whole run, which breaks no limit.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ _MOST_CUTS: Final = 60
 _FAR: Final = 1e12
 _REACH: Final = 0.55
 _SHORT_m: Final = 1e-5
-"""Between nodes that are closer than this, rounding hides the third derivative."""
+"""Between nodes that are closer than this, the third derivative is lost in rounding errors."""
 
 
 class Curve(NamedTuple):
@@ -71,7 +70,7 @@ class Curve(NamedTuple):
 
 
 class WrenchBounds(NamedTuple):
-    """Wrenches that tensions can exert along a path, as half-spaces, and those that it requires.
+    """Wrenches that tensions can exert along a path, as half-spaces, and wrenches that it requires.
 
     lower <= normals · (by_u u + by_x x) <= upper at node i with `row[i]`; -1 if tensions allow any
     motion within the limits of acceleration.
@@ -103,7 +102,7 @@ def _bounds(
 ) -> None:
     """Write the least and largest u at x at node i, and their derivatives by x, into found (4,).
 
-    Bounded by accelerations first·u + second·x, up to ±`most` (d,), and by `wrenches`.
+    u is bounded by the accelerations first·u + second·x, up to ±`most` (d,), and by `wrenches`.
     """
     found[0], found[1], found[2], found[3] = -_FAR, _FAR, 0.0, 0.0
     for k in range(most.size):
@@ -145,7 +144,8 @@ def scale_run(
 ) -> None:
     """Write the largest x (N,) up to `bound` (N,) from node `begin` to `end`, at rest at both.
 
-    Backward: the largest x from which the next node's x can be reached. Forward: the largest u.
+    The backward pass finds the largest x from which the next node's x can be reached. The forward
+    pass takes the largest u.
     """
     s, found = curve.s, x[:4].copy()
     x[begin] = x[end] = 0.0
@@ -231,8 +231,9 @@ def smooth_run(
 ) -> None:
     """Write s and three derivatives by time, (c, 4), every `period_s`, of a run's smoothed motion.
 
-    It is the average over the last `width_s`: if the acceleration has steps, the third derivative
-    is at most their height over the width. It lasts longer by the width, at rest at both ends.
+    The smoothed motion is the average over the last `width_s`. If the acceleration has steps, the
+    third derivative is at most their height divided by the width. The motion lasts longer by the
+    width, and is at rest at both ends.
     """
     now, before = motion[0].copy(), motion[0].copy()
     i = j = begin
@@ -249,7 +250,7 @@ def smooth_run(
 def place_between(along: float, i: int, curve: Curve, out: FloatArray) -> None:
     """Write position and three derivatives by length, (4, d), between the nodes i and i + 1.
 
-    It is the polynomial of fifth order with both nodes' positions and two derivatives.
+    The curve is the polynomial of fifth order with the positions and two derivatives of both nodes.
     """
     s, q, first, second = curve
     h = s[i + 1] - s[i]
@@ -275,7 +276,8 @@ def strain_run(
 ) -> None:
     """Write the factor (c,) by which each sample of `motion` (c, 4) is too fast, and its node.
 
-    `limits` (3, d) are those of velocity, acceleration and jerk, `speed` (N,) that along the path.
+    `limits` (3, d) are limits of velocity, acceleration and jerk; `speed` (N,) is the limit along
+    the path.
     """
     s, at = curve.s, curve.q[:4].copy()  # a run has five nodes at least
     i = begin
@@ -298,7 +300,9 @@ def strain_run(
 def _direction_strain(
     at: FloatArray, motion: FloatArray, bends: float, limits: FloatArray, positions: int
 ) -> tuple[float, float]:
-    """Return the worst strain of the directions' limits, and the speed along the path."""
+    """Return the largest ratio of motion to limit over the directions, and the speed along the
+    path.
+    """
     v, a, j = motion[1], motion[2], motion[3]
     worst, straight, turned = 0.0, 0.0, 0.0
     for k in range(at.shape[1]):
@@ -342,8 +346,8 @@ def lower_bounds(
 ) -> bool:
     """Lower `bound` (N,) of x if the smoothed motion is too fast there; return whether it was.
 
-    A sample is an average over `width_s`. Therefore the stretch that is passed in that time at the
-    wanted speed is slowed.
+    A sample is an average over `width_s`. So the part of the path that is passed in that time at
+    the wanted speed is slowed.
     """
     lowered = False
     for c in range(motion.shape[0]):
@@ -441,7 +445,7 @@ MOST_SAMPLES: Final = 100_000
 _TOLERANCE: Final = 1.005
 _ROUNDS: Final = 20
 _FINER: Final = 3.0
-"""Places that are checked per sample."""
+"""Number of positions checked per sample."""
 _SHARE: Final = 0.98
 """Share of acceleration and jerk that the first passes use; smoothing needs the rest."""
 _SLOWEST_m_s: Final = 1e-4
@@ -450,7 +454,7 @@ _TIME_SCALING_NOTHING: Final = 1e-9
 
 @dataclass(frozen=True)
 class PathLimits:
-    """Limits of each coordinate, (d,) each, per s, s² and s³."""
+    """Limits of velocity, acceleration and jerk of each coordinate, (d,) each, per s, s² and s³."""
 
     velocity: FloatArray
     acceleration: FloatArray
@@ -465,7 +469,7 @@ class PathLimits:
     def smoothing_s(self) -> float:
         """Time over which velocities are averaged: twice the largest acceleration, over jerk.
 
-        It is at least a millisecond, also if jerk is not limited.
+        It is at least a millisecond, even if jerk is not limited.
         """
         return max(2.0 * float((self.acceleration / self.jerk).max()), 1e-3)
 
@@ -478,17 +482,17 @@ class TimedPath:
     samples: FloatArray
     """Position, velocity and acceleration (c, 3, d)."""
     node: IntArray
-    """The node before each, (c,)."""
+    """The node before each sample, (c,)."""
     along_m: FloatArray
-    """Length along the path, weighted as the nodes', (c,)."""
+    """Length along the path, (c,), weighted like that of the nodes."""
     waits: IntArray
-    """Samples at which it waits for a command to continue."""
+    """Samples at which the path waits for a command to continue."""
     rounds: int
     """Largest number of scaling passes of a run."""
     departure_m: float
     """Largest distance of the set-point from the nodes' path, between samples."""
     departs: int
-    """Node of that distance."""
+    """Node at which this distance occurs."""
 
     @property
     def duration_s(self) -> float:
@@ -514,7 +518,7 @@ def time_path(nodes: PathNodes, limits: PathLimits, wrenches: WrenchBounds) -> T
             worst = int(run.away_m.argmax())
             if run.away_m[worst] > departure_m:
                 departure_m, departs = float(run.away_m[worst]), int(run.node[worst])
-        # a wait follows a moment of rest, so there must be one at the start of the path
+        # a wait follows a moment of rest, so the path must begin with one
         resting = max(int(np.ceil(dwell_s / PERIOD_S)), int(wait and not count))
         still = np.zeros((resting, 3, nodes.q.shape[1]))
         still[:, 0] = last_q
@@ -547,7 +551,7 @@ def speed_bounds(nodes: PathNodes, limits: PathLimits) -> FloatArray:
     """Return the largest (ds/dt)² of each node, (N,), by velocity, feed and bends."""
     k = nodes.coordinates.positions
     first, second = np.abs(nodes.first), np.abs(nodes.second)
-    # coordinates that hardly move allow infinite speed
+    # coordinates that hardly move allow infinite speed along the path
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         bounds = [(limits.velocity / first) ** 2, _SHARE * limits.acceleration / second]
         straight, turned = (np.linalg.norm(part, axis=1) for part in (first[:, :k], first[:, k:]))
@@ -604,7 +608,9 @@ def _scale(
             begin, end, width_s, _TOLERANCE, nodes.s, motion, strain, where, bound
         )
         if not lowered:
-            slower = max(1.0, float(strain.max()))  # the number of samples gives the exact factor
+            slower = max(
+                1.0, float(strain.max())
+            )  # rounding to whole samples then gives the exact factor
             motion = _smoothed(nodes, begin, end, width_s, duration_s, slower, x, times, swept)
             slower = PERIOD_S * (len(motion) - 1) / duration_s
             run = _sampled(nodes, begin, end, slower, motion, rounds)

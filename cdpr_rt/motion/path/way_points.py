@@ -30,7 +30,7 @@ _UNITS: Final = {
 }  # fmt: skip
 _SPEEDS: Final = {"speed_m_s": 1.0, "speed_mm_s": 1e-3}
 _BOM: Final = "\ufeff"
-"""Spreadsheets begin texts in UTF-8 with it."""
+"""Byte order mark, with which spreadsheets begin texts in UTF-8."""
 _BLENDS: Final = {"blend_m": 1.0, "blend_mm": 1e-3}
 _Speed = Annotated[float, Field(gt=0, le=100)]
 _Blend = Annotated[float, Field(ge=0, le=10)]
@@ -62,7 +62,7 @@ def read_toml_points(path: Path, coordinates: Coordinates) -> PathDescription:
     if not text.endswith("\n"):
         raise PathError(path, text.count("\n") + 1, "does not end with a newline: is it truncated?")
     lines = [text.count("\n", 0, head.start()) + 1 for head in _HEADS.finditer(text)]
-    lines += [0] * (len(table.points) - len(lines))  # an array in one line
+    lines += [0] * (len(table.points) - len(lines))  # the array may be in one line
     k, d = coordinates.positions, len(coordinates.names)
     found: PathDescription | None = None
     rotation = np.zeros(d - k)
@@ -191,7 +191,7 @@ def _cells(
     return values
 
 
-# Reading a path's file, whose suffix gives its kind.
+# Reading a path's file; the suffix gives its kind.
 
 MOST_BYTES: Final = 1 << 24
 GCODE: Final = (".nc", ".ngc", ".gcode", ".tap", ".cnc")
@@ -199,7 +199,9 @@ _POINTS: Final = (".toml", ".csv")
 
 
 def require_kind(path: Path) -> str:
-    """Return the file's suffix in lower case; raises PathError if it is not one of a path."""
+    """Return the file's suffix in lower case; raises PathError if it is not the suffix of a
+    path.
+    """
     suffix = path.suffix.lower()
     if suffix not in (*_POINTS, *GCODE):
         raise PathError(
