@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import stat
+import time
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -178,6 +179,7 @@ _PROGRAMS: Final = ("cdpr", "cdpr_tools.cli")
 _RUNS: Final = ("run", "start")
 _RUNTIME_VARIABLE: Final = b"XDG_RUNTIME_DIR"
 _MOST_DOING: Final = 160
+_NAMED_WITHIN_S: Final = 0.5
 _MOST_LAUNCHER_BYTES: Final = 64 + _MOST_DOING
 
 
@@ -230,7 +232,14 @@ class LauncherLock:
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise _taken(socket, launcher_pid(self._path)) from None
+            raise _taken(socket, self._owner()) from None
+
+    def _owner(self) -> int | None:
+        """Return the process that has the lock; wait for its name if it has only just taken it."""
+        end_s = time.monotonic() + _NAMED_WITHIN_S
+        while (pid := launcher_pid(self._path)) is None and time.monotonic() < end_s:
+            time.sleep(0.01)
+        return pid
 
     def _is_at_path(self, fd: int) -> bool:
         try:
