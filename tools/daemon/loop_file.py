@@ -12,8 +12,8 @@ import os
 import select
 import signal
 import stat
-import time
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final, Self
