@@ -298,18 +298,18 @@ def _rebuild(target_context: Any, payload: Any) -> Any:
     except (ValueError, AttributeError):  # a version of numba that stores them differently
         return rebuild(target_context, *payload)
     engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
-    library_data = name, kind, (machine_code, _empty_bitcode())
-    result = rebuild(target_context, library_data, described, *others)
-    library = result.library
-    library._shared_module = None
+    stored = name, kind, (machine_code, _empty_bitcode())
+    result = rebuild(target_context, stored, described, *others)
+    code = result.library
+    code._shared_module = None
 
     def module_for_linking() -> Any:
-        if library._shared_module is None:
-            library._shared_module = _BITCODE.parse_bitcode(bitcode)
-            engine._load_defined_symbols(library._shared_module)
-        return library._shared_module
+        if code._shared_module is None:
+            code._shared_module = _BITCODE.parse_bitcode(bitcode)
+            engine._load_defined_symbols(code._shared_module)
+        return code._shared_module
 
-    library._get_module_for_linking = module_for_linking
+    code._get_module_for_linking = module_for_linking
     return result
 
 

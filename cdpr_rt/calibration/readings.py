@@ -417,10 +417,10 @@ class CalibrationData(Profile):
             self._tensions(robot, model),
             start,
         )
-        anew = tuple((cable, pose) for pose in self.restarts for cable in range(n))
+        jumps = tuple((cable, pose) for pose in self.restarts for cable in range(n))
         seen = self._with_measured(seen, model.positions)
         assumed = all(reading.tension_N is None for reading in self.poses)
-        return replace(seen, jumps=anew, time_s=self._times(), tension_assumed=assumed)
+        return replace(seen, jumps=jumps, time_s=self._times(), tension_assumed=assumed)
 
     def _tensions(self, robot: Robot, model: PlatformModel) -> FloatArray:
         """Return tensions (N, n); assumed values if no tension was measured."""
