@@ -101,7 +101,7 @@ def _reading(
 ) -> PoseReading:
     """Return the reading of one instant."""
     values: dict[str, Any] = {
-        "target": tuple(_target(model, position_m, turned)),
+        "target": tuple(_target(model, position_m)),
         "length_m": tuple(length_m.tolist()),
         "time_s": time_s,
         "position_m": tuple(position_m.tolist()),
@@ -125,7 +125,7 @@ def _read_cables(
             raise ProfileError(
                 table.path,
                 f"cables.{what}",
-                f"{len(given)} columns; allowed: {cables}, one a cable",
+                f"{len(given)} columns; allowed: {cables}, one for each cable",
             )
     time = read_time(columns.time, table)
     lengths = np.column_stack([one.read_all(table, LENGTHS) for one in columns.lengths])
@@ -188,13 +188,13 @@ def _rows(time: FloatArray, poses_s: FloatArray, mapping: CalibrationMapping) ->
     return np.array(kept, int)
 
 
-def _target(model: PlatformModel, position_m: FloatArray, turned: Rotation | None) -> list[float]:
-    """Return the coordinates (d,) of a pose."""
+def _target(model: PlatformModel, position_m: FloatArray) -> list[float]:
+    """Return the coordinates (d,) where a search begins: at this position, turned as at home.
+
+    The fit keeps the rotation near its target. A measured one would verify itself.
+    """
     vector = np.zeros(6)
     vector[:3] = position_m
-    if turned is not None:
-        home = Rotation.from_matrix(model.home_pose.Q)
-        vector[3:] = (turned * home.inv()).as_rotvec()
     return [float(vector[i]) for i in model.kinematics.directions]
 
 
