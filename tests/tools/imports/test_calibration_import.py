@@ -134,3 +134,31 @@ def test_a_wrong_mapping_is_named(tmp_path: Path, old: str, new: str, text: str)
     result = run(tmp_path, files)
     assert result.returncode == 2
     assert text in result.stderr
+
+
+def test_a_measured_rotation_is_data_and_not_where_the_search_begins(tmp_path: Path) -> None:
+    robot = load_robot("planar-4")
+    model = platform_model_of(robot)
+    time = np.arange(0.0, 2.0, 0.01)
+    lines = ["t,l1,l2,l3,l4,x,y,z,a,b,c,w"]
+    for t in time:
+        half = 0.02 * t  # turned by 0.08 rad in the end
+        x, y = model.home[:2]
+        lines.append(f"{t},1,1,1,1,{x},{y},0,0,0,{np.sin(half)},{np.cos(half)}")
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    one = '{{ name = "{}" }}'.format
+    lengths = ", ".join(map(one, ("l1", "l2", "l3", "l4")))
+    (tmp_path / "map.toml").write_text(
+        f"[cables]\ntime = {one('t')}\nlengths = [{lengths}]\n"
+        f"[pose]\ntime = {one('t')}\nposition = [{', '.join(map(one, 'xyz'))}]\n"
+        f"quaternion = [{', '.join(map(one, 'abcw'))}]\n"
+    )
+    done = cdpr_here(
+        *("import", "calibration", "planar-4", tmp_path / "a.csv"),
+        *("--map", tmp_path / "map.toml", "--out", tmp_path / "out"),
+    )
+    assert done.returncode == 0, done.stderr
+    last = load_data(tmp_path / "out" / "data.json").poses[-1]
+    assert last.rotation is not None
+    assert abs(last.rotation[1][0]) > 0.06
+    assert last.target[2] == 0.0
