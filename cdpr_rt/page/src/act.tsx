@@ -69,8 +69,16 @@ function useSettled(value: unknown): boolean {
   return settled === value;
 }
 
-export function NextStep() {
+/** Why the daemon rejected the last request, in sight from every view. */
+export function RejectedMessage() {
   const { rejected } = useStore();
+  if (!rejected) return null;
+  return <p class="rejected" role="alert">{rejected} <button class="plain" onClick={() => store.change({ rejected: "" })}>Close</button></p>;
+}
+
+/** The state, its cause and the one next step: the head of every view. */
+export function NextStep() {
+  useStore();
   const { tone, title, detail, next } = useSituation();
   const [working, setWorking] = useState(false);
   const settled = useSettled(next);
@@ -81,9 +89,10 @@ export function NextStep() {
   };
   return (
     <section class={`card situation ${tone}`} aria-label="State and next step">
-      <h1 aria-live="polite">{title}</h1>
-      {detail && <p>{detail}</p>}
-      {rejected && <p class="rejected" role="alert">{rejected} <button class="plain" onClick={() => store.change({ rejected: "" })}>Close</button></p>}
+      <div>
+        <h1 aria-live="polite">{title}</h1>
+        {detail && <p>{detail}</p>}
+      </div>
       {next && next !== "move" && hasKey() && <button class="next" disabled={working || !settled} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
       {!hasKey() && <Key />}
     </section>

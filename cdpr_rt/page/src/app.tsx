@@ -1,6 +1,9 @@
 // The operator's page.
-import { render } from "preact";
-import { Move, NextStep, PowerOff, Simulation, StopButton, useSituation } from "./act";
+import { type ComponentType, render } from "preact";
+import { useEffect } from "preact/hooks";
+import { Move, NextStep, PowerOff, RejectedMessage, Simulation, StopButton, useSituation } from "./act";
+import { linkTo, useView } from "./address";
+import { type Description, hasKey } from "./daemon";
 import { Axes, Events, Recording, RobotView, Tensions, Trends } from "./look";
 import { useStore } from "./store";
 import "uplot/dist/uPlot.min.css";
@@ -30,24 +33,62 @@ function Header() {
   );
 }
 
+function Robot() {
+  return (
+    <div class="columns">
+      <div class="column wide">
+        <RobotView />
+        <Trends />
+        <Axes />
+      </div>
+      <div class="column">
+        <Move />
+        <Tensions />
+        <Events />
+        <Recording />
+        <Simulation />
+      </div>
+    </div>
+  );
+}
+
+interface View {
+  /** In the address, after #. */
+  name: string;
+  title: string;
+  component: ComponentType;
+  /** Whether the navigation shows it for this robot; always if omitted. */
+  suits?: (description: Description) => boolean;
+}
+
+/** The page's views in the order of the navigation; the first is shown without a name in the address. */
+const VIEWS: View[] = [
+  { name: "robot", title: "Robot", component: Robot },
+];
+
 function App() {
+  const { description } = useStore();
+  const { view } = useView();
+  const views = VIEWS.filter(({ suits }, number) => number === 0 || (hasKey() && description && (suits?.(description) ?? true)));
+  const { name, title, component: Shown } = views.find((one) => one.name === view) ?? views[0]!;
+  useEffect(() => {
+    document.title = `${title} – ${description?.robot ?? "cdpr-rt"}`;
+    scrollTo(0, 0);
+  }, [name, description?.robot]);
   return (
     <>
-      <Header />
+      <div class="top">
+        <Header />
+        {views.length > 1 && (
+          <nav aria-label="Views">
+            {views.map((one) => <a key={one.name} href={linkTo(one.name)} aria-current={one.name === name ? "page" : undefined}>{one.title}</a>)}
+          </nav>
+        )}
+        <RejectedMessage />
+      </div>
       <main>
-        <div class="column wide">
-          <RobotView />
-          <Trends />
-          <Axes />
-        </div>
-        <div class="column">
-          <NextStep />
-          <Move />
-          <Tensions />
-          <Events />
-          <Recording />
-          <Simulation />
-        </div>
+        <NextStep />
+        <Shown />
       </main>
     </>
   );

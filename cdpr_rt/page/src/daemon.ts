@@ -1,4 +1,5 @@
 // The daemon's interface: requests with the key, live figures, and the right to move.
+import { keepKey, takeKey } from "./address";
 import type { components, paths } from "./api";
 
 export type Status = components["schemas"]["Status"];
@@ -46,28 +47,15 @@ const FIELDS = "time_s,tension_N,tension_measured,pose,pose_setpoint";
 const RATE_Hz = 30;
 const RETRY_MS = 1000;
 const SILENT_MS = 4000;
-const KEY = "cdpr-key";
 const UNAUTHORIZED = 401;
 
-/** Take the key from the address, where `cdpr run` puts it, and keep it for this tab. */
-function takeKey(): string {
-  const given = new URLSearchParams(location.hash.slice(1)).get("key");
-  if (given) {
-    sessionStorage.setItem(KEY, given);
-    history.replaceState(null, "", location.pathname);
-  }
-  return sessionStorage.getItem(KEY) ?? "";
-}
-
 let key = takeKey();
-// an address with another key, entered while the page is open, loads nothing by itself
-addEventListener("hashchange", () => location.reload());
 
 export const hasKey = (): boolean => key !== "";
 
 export function setKey(text: string): void {
   key = text;
-  sessionStorage.setItem(KEY, text);
+  keepKey(text);
 }
 
 export async function request<T>(
