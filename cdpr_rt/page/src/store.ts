@@ -25,8 +25,8 @@ class Store {
       event: (value) => this.change({ events: [value, ...this.events.filter((one) => one.number !== value.number)].slice(0, KEPT_EVENTS) }),
       cycle: (value) => this.cycles.forEach((listener) => listener(value)),
       connected: (value) => {
-        if (value === this.connected) return;
-        this.change({ connected: value });
+        if (value === this.connected && value) return;
+        this.change({ connected: value }); // a rejected key is shown although the page was not connected before
         if (value) void this.#earlierEvents();
       },
     });
