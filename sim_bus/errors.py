@@ -7,3 +7,7 @@ class SimulatorError(Exception):
 
 class BusSetupError(SimulatorError):
     """The simulated bus cannot be named or opened."""
+
+
+class RequestError(SimulatorError):
+    """A client's request that the simulator rejects."""

@@ -48,7 +48,6 @@ from cdpr_rt.service.stream_packet import (
     parse,
     seal,
 )
-from cdpr_tools.composition.fault_injection import writes_of
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells
@@ -589,8 +588,7 @@ class LockstepRobot:
     def inject_fault(self, axis: int, fault: str, value: int | None) -> None:
         """Inject a fault by its name."""
         with self._for_script():
-            for sub, amount in writes_of(fault, value):
-                self.inject(axis, sub, amount)
+            self.simulator.inject(fault, axis + 1, value)
 
     def end(self) -> None:
         """End under control, then without power."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import functools
+import heapq
 import json
 import math
 import os
@@ -12,7 +13,7 @@ import select
 import socket
 import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cdpr_profiles.bounded_input import parse_json
@@ -28,7 +29,7 @@ from cdpr_sim_bus.bus.client import (
     Route,
 )
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
-from cdpr_sim_bus.errors import SimulatorError
+from cdpr_sim_bus.errors import RequestError, SimulatorError
 from cdpr_sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG
 
 FINE_WAIT_S = 0.01
@@ -211,7 +212,7 @@ class Lead:
             return
 
 
-_KEYS = "filters, lead, more_filters, status"
+_KEYS = ("filters", "lead", "more_filters", "status")
 
 
 def encode(message: dict[str, Any]) -> bytes:
@@ -220,21 +221,18 @@ def encode(message: dict[str, Any]) -> bytes:
     return text + b" " if len(text) == FRAME_BYTES else text
 
 
-class _RefusedError(Exception):
-    """A request that the bus rejects, with the reason."""
-
-
 def _request(packet: bytes) -> tuple[str, Any]:
     """Return key and value of a message."""
     if len(packet) == PACKET_BYTES:
-        raise _RefusedError(f"a control message has less than {PACKET_BYTES} bytes; send several")
+        raise RequestError(f"a control message has less than {PACKET_BYTES} bytes; send several")
     if is_go(packet):
-        raise _RefusedError("go: only the client that leads the bus may move its time")
+        raise RequestError("go: only the client that leads the bus may move its time")
     try:
         ((key, value),) = parse_json(packet, "message").items()
     except (ProfileError, ValueError, AttributeError):
-        raise _RefusedError(
-            f"neither a frame of {FRAME_BYTES} bytes nor a JSON object with one key of: {_KEYS}"
+        raise RequestError(
+            f"neither a frame of {FRAME_BYTES} bytes nor a JSON object with one key of: "
+            f"{', '.join(_KEYS)}"
         ) from None
     return key, value
 
@@ -246,10 +244,33 @@ def _filters(key: str, value: object) -> list[tuple[int, int]]:
             case [int(identifier), int(mask)] if min(pair) >= 0 and max(pair) < 1 << 32:
                 filters.append((identifier, mask))
             case _:
-                raise _RefusedError(
+                raise RequestError(
                     f"{key}: expected a list of [identifier, mask], 32-bit numbers each"
                 )
     return filters
+
+
+class Plan:
+    """Actions of a bus at given bus times; those of the same time in the order of their orders."""
+
+    def __init__(self) -> None:
+        self.next_s = math.inf
+        """Bus time of the next action; `math.inf` without one."""
+        self._waiting: list[tuple[float, int, Callable[[], None]]] = []
+        self._count = 0
+
+    def add(self, at_s: float, action: Callable[[], None]) -> None:
+        """Call `action` at bus time `at_s`."""
+        self._count += 1
+        heapq.heappush(self._waiting, (at_s, self._count, action))
+        self.next_s = self._waiting[0][0]
+
+    def run(self, now_s: float) -> None:
+        """Call the actions that are due at `now_s`."""
+        while self.next_s <= now_s:
+            action = heapq.heappop(self._waiting)[2]
+            self.next_s = self._waiting[0][0] if self._waiting else math.inf
+            action()
 
 
 _BURST = 64
@@ -297,6 +318,11 @@ class Hub:
         """The hubs of one robot, including this one; their wall time begins together."""
         self.buses_before: Sequence[Hub] = ()
         """Those of `robot_hubs` to which the master sends its SYNC before it sends to this one."""
+        self.plan = Plan()
+        """Faults to come."""
+        self.requests: Mapping[str, Callable[[Any], Any]] = {}
+        """Functions that answer further requests of clients; they raise RequestError."""
+        self._asked: list[tuple[Client, str, Any]] = []
         self._waiting = Contention(paced=paced, bitrate=bitrate)
         self._just_synced = False
         self._watcher = Watcher()
@@ -418,6 +444,21 @@ class Hub:
             self._follow(self.clock.now(time.monotonic()))
         if self._leftover:
             self._flush()
+        if self._asked and not self._waiting.heads:
+            self._answer()
+
+    def _answer(self) -> None:
+        """Answer the requests, after all frames that were sent before them on the robot's buses."""
+        asked, self._asked = self._asked, []
+        for hub in self.robot_hubs:
+            if hub is not self:
+                hub.turn(0.0)
+        for client, key, value in asked:
+            try:
+                answer = {key: self.requests[key](value)}
+            except RequestError as error:
+                answer = {"error": str(error)}
+            self._reply(client, answer)
 
     def close(self) -> None:
         """Close the nodes and every socket."""
@@ -432,7 +473,7 @@ class Hub:
 
     def wait_s(self) -> float | None:
         """Return how long the next turn may wait; None without limit."""
-        if self._leftover or self._waiting.heads or self.lead.until_s is not None:
+        if self._leftover or self._waiting.heads or self._asked or self.lead.until_s is not None:
             return 0.0
         if self._just_synced:
             return HOLD_S
@@ -472,7 +513,7 @@ class Hub:
 
     def _tick(self, now_s: float) -> bool:
         """Run the nodes' timers if one is due; return whether one was."""
-        due = any(node.next_event() <= now_s for node in self.nodes)
+        due = self.next_event_s() <= now_s
         if due:
             self.advance(now_s)
         return due
@@ -560,16 +601,19 @@ class Hub:
             return False
         try:
             answer = self._obey(client, *_request(packet))
-        except _RefusedError as error:
+        except RequestError as error:
             answer = {"error": str(error)}
         if answer is None:
             self._routes.clear()
         else:
-            try:
-                client.sock.send(encode(answer))
-            except OSError as error:
-                self._lose(client, error)
+            self._reply(client, answer)
         return True
+
+    def _reply(self, client: Client, answer: dict[str, Any]) -> None:
+        try:
+            client.sock.send(encode(answer))
+        except OSError as error:
+            self._lose(client, error)
 
     def _obey(self, client: Client, key: str, value: Any) -> dict[str, Any] | None:
         """Execute a request and return the answer; None if it has no answer."""
@@ -584,7 +628,10 @@ class Hub:
             filters = _filters(key, value)
             client.filters = filters if key == "filters" else (client.filters or []) + filters
             return None
-        raise _RefusedError(f"unknown request {key!r}; known: {_KEYS}")
+        if key in self.requests:
+            self._asked.append((client, key, value))
+            return None
+        raise RequestError(f"unknown request {key!r}; known: {', '.join((*_KEYS, *self.requests))}")
 
     def _take(self, frame: bytes, source: Client) -> bool:
         """Carry one frame of a client; return whether it was a SYNC."""
@@ -645,8 +692,10 @@ class Hub:
             for node in nodes:
                 period_s = max(period_s, node.sync_period_s)
         wall_s = source.sent_s if self._paced else time.monotonic()
-        self._now_s = now_s = self.clock.sync(wall_s, period_s)
+        now_s = self.clock.sync(wall_s, period_s)
         self._just_synced = self.clock.held
+        self._act_until(now_s)
+        self._now_s = now_s
         for node in nodes:
             node.advance(now_s)
         # timers that expired before the SYNC send before it
@@ -666,6 +715,11 @@ class Hub:
                 if self is self.robot_hubs[-1]:
                     self._prepare(now_s + period_s)
 
+    def _act_until(self, now_s: float) -> None:
+        """Do what is planned before or at a SYNC, each at its own time."""
+        while self.plan.next_s <= now_s:
+            self.advance(max(self.plan.next_s, self._now_s))
+
     def _prepare(self, until_s: float) -> None:
         """Let the nodes of all buses work on the next period while the master works on this one."""
         for hub in self.robot_hubs:
@@ -675,19 +729,32 @@ class Hub:
     # -- frames of nodes
 
     def next_event_s(self) -> float:
-        """Return the bus time of the next timer of a node; `math.inf` if none runs."""
-        next_s = math.inf
+        """Return the bus time of the next timer of a node or action; `math.inf` without one."""
+        next_s = self.plan.next_s
         for node in self.nodes:
             next_s = min(next_s, node.next_event())
         return next_s
 
     def advance(self, now_s: float) -> None:
-        """Advance all nodes to bus time `now_s` and send their frames."""
+        """Advance all nodes to bus time `now_s`, act as planned and send the nodes' frames."""
         self._now_s = now_s
         for node in self.nodes:
             node.advance(now_s)
+        self.plan.run(now_s)
         self._check_accepts()
         self._flush()
+
+    @property
+    def now_s(self) -> float:
+        """Bus time now."""
+        return self.clock.now(time.monotonic())
+
+    def act(self, at_s: float, action: Callable[[], None]) -> None:
+        """Call `action` at bus time `at_s`, which may be now."""
+        self.plan.add(at_s, action)
+        if at_s <= (now_s := self.now_s):
+            self.advance(now_s)
+            self.settle()
 
     def settle(self) -> None:
         """Deliver the nodes' answers to each other's frames, for a limited number of rounds."""

@@ -26,6 +26,13 @@ _PRIORITY = 40
 _CHANNEL = "can0"
 
 
+class Bench(Protocol):
+    """Takes orders beside the frames."""
+
+    def connect(self, hubs: Sequence[Hub]) -> None:
+        """Take the orders of clients of these buses."""
+
+
 class Loop(Protocol):
     """Event loop of one or several buses."""
 
@@ -50,6 +57,7 @@ def serve(
     until_stdin_ends: bool = False,
     slcan: bool = False,
     socketcand_port: int | None = None,
+    bench: Bench | None = None,
 ) -> None:
     """Run `nodes` on `bus` until SIGTERM or SIGINT, then close them.
 
@@ -57,7 +65,7 @@ def serve(
     ready, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}};
     a terminal gets a few readable lines instead. With `until_stdin_ends`, the end of standard input
     also stops it: if the parent holds the other end of this pipe, the simulator never outlives it.
-    `frame_log` receives all frames, as those of can0.
+    `frame_log` receives all frames, as those of can0. `bench` takes orders through a simbus.
 
     A simbus can also be reached through a serial CAN adapter (`slcan`) on a pseudo-terminal and by
     the socketcand protocol on a port of 127.0.0.1 (0: any free port). "ready" then contains
@@ -73,6 +81,8 @@ def serve(
     with ExitStack() as stack:
         logged = with_frame_log(nodes, frame_log, _CHANNEL)
         hub = open_hub(stack, logged, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
+        if bench is not None:
+            bench.connect([hub])
         gateways = _open_gateways(stack, hub, slcan, socketcand_port)
         ready = {"bus": bus, "pid": os.getpid(), **gateways, **hub.status()}
         run_until_stopped(hub, ready, mode, until_stdin_ends)
@@ -295,13 +305,15 @@ def serve_fleet(
     until_stdin_ends: bool = False,
     frame_log: FrameLog | None = None,
     truth_log: str | None = None,
+    bench: Bench | None = None,
 ) -> None:
     """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
 
     When everything is ready, one line of JSON goes to standard output: {"ready": {"robot", "pid",
     "buses": {name: {"bus", and the bus status}}}}. With `until_stdin_ends`, the end of standard
-    input also stops it. `frame_log` receives all frames, under the names of the buses. Raises
-    BusSetupError if a bus cannot be opened, SimulatorError if a real interface was lost.
+    input also stops it. `frame_log` receives all frames, under the names of the buses. `bench`
+    takes orders through each simbus. Raises BusSetupError if a bus cannot be opened,
+    SimulatorError if a real interface was lost.
     """
     with ExitStack() as stack:
         hubs = {
@@ -319,6 +331,8 @@ def serve_fleet(
         if len(hubs) > 1:
             loop = fleet = Fleet(list(hubs.values()))
             stack.callback(fleet.close)
+        if bench is not None:
+            bench.connect(list(hubs.values()))
         report = {bus.name: {"bus": bus.url, **hubs[bus.name].status()} for bus in buses}
         ready = {"robot": robot, "pid": os.getpid(), "buses": report}
         run_until_stopped(loop, ready, mode, until_stdin_ends)

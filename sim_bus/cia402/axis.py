@@ -135,40 +135,54 @@ class Axis:
         self.motor["zero"] -= counts
 
     @property
-    def _has_cable(self) -> bool:
-        return self._robot is not None or self.plant.load.kind != "none"
+    def has_cable(self) -> bool:
+        """Whether there is a cable."""
+        return self.has_platform or self.plant.load.kind != "none"
 
-    def cut_cable(self) -> bool:
-        """Cut the cable; return whether there is one."""
+    @property
+    def has_platform(self) -> bool:
+        """Whether the cable leads to a platform."""
+        return self._robot is not None
+
+    def cut_cable(self) -> None:
+        """Cut the cable."""
         if self._robot is not None:
             self._robot.cut()
-        elif self._has_cable:
+        else:
             remove_cable(self.motor)
-        self.cable_cut = self._has_cable
-        return self._has_cable
+        self.cable_cut = True
 
-    def slip_cable(self, metres: float) -> bool:
-        """Let a length of cable slip at its fastening on the drum; return whether there is one."""
+    def slip_cable(self, metres: float) -> None:
+        """Let a length of cable slip at its fastening on the drum."""
         if self._robot is not None:
             self._robot.slip(metres)
-        elif self._has_cable:
+        else:
             lengthen_cable(self.motor, metres)
-        self.slipped_m += metres * self._has_cable
-        return self._has_cable
+        self.slipped_m += metres
 
     def mend_cable(self) -> None:
         """Attach the cable again and fasten it on the drum."""
         if self._robot is not None:
             self._robot.mend(self.cable_cut, self.slipped_m)
-        elif self._has_cable:
+        elif self.has_cable:
             mend_cable(self.motor, self.plant.load, self.slipped_m)
         self.cable_cut, self.slipped_m = False, 0.0
 
-    def put_platform_back(self) -> bool:
-        """Put the robot's platform at its start pose; return whether there is one."""
+    @property
+    def cable_state(self) -> str:
+        """Return "none", "cut", "slipped" or "intact"."""
+        if not self.has_cable:
+            return "none"
+        return "cut" if self.cable_cut else "slipped" if self.slipped_m else "intact"
+
+    def put_platform_back(self) -> None:
+        """Put the robot's platform at its start pose."""
         if self._robot is not None:
             self._robot.put_back()
-        return self._robot is not None
+
+    def platform_truth(self) -> dict[str, list[float]] | None:
+        """Return the true pose and motion of the platform; None without one."""
+        return None if self._robot is None else self._robot.robot.truth()
 
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""

@@ -23,228 +23,16 @@ from cdpr_sim_bus.cia402.drive_quirks import (
     add_missing_objects,
     quirks_of,
 )
+from cdpr_sim_bus.cia402.faults import FaultInjection
 from cdpr_sim_bus.cia402.modes import IN_PLACE, METHODS
 from cdpr_sim_bus.cia402.state_machine import StateMachine
 from cdpr_sim_bus.cia402.words import ErrorCode
-from cdpr_sim_bus.frame import pack_frame
 from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import RobotMember
 from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.truth_log import NO_SYNC, TruthLog
-
-# Fault injection through object 2F00h, to test a master's reactions over the bus.
-
-_RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
-_FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
-_JUMP, _CUT_CABLE, _SLIP, _CELL_OFF, _PUT_BACK = 11, 12, 13, 14, 15
-_COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
-_DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
-_ERROR_CONTROL, _SDO_ANSWER, _SDO_REQUEST, _EMCY = 0x700, 0x580, 0x600, 0x080
-_FUNCTION, _NODE, _DATA_AT = 0x780, 0x07F, 8
-_FOR_GOOD_MS = 0xFFFF
-_EXPEDITED_MASK, _EXPEDITED = 0xE2, 0x22
-"""First byte of an SDO: an expedited download, of any size."""
-_NO_SILENCE = bytes.fromhex("002f0600000000")
-"""The bytes after the first one of an SDO download of 0 to 2F00h:6."""
-_BABBLE_FRAME = b"\x00\xff\x81BABBL"
-"""EMCY FF00h (device specific)."""
-
-
-class FaultInjection:
-    """Object 2F00h of simulated drives; an EDS may lack all or part of it."""
-
-    def __init__(
-        self, od: ObjectDictionary, state_machine: StateMachine, outbox: list[bytes]
-    ) -> None:
-        self._od = od
-        self._state_machine = state_machine
-        self._axis = state_machine.axis
-        self._outbox = outbox
-        self._left = dict.fromkeys(_COUNTED, 0)
-        """Remaining number of frames that each counted fault affects."""
-        self._late: list[bytes] = []
-        self._muted = False
-        self._babble = 0
-        self._last_babble_ms = 0
-        self._now = 0.0
-        self._silent_until = 0.0
-        self._silence_ms = _FOR_GOOD_MS
-        self.active = False
-        """Whether frames of the outbox must be altered."""
-        writers: dict[int, Callable[[Any], None]] = {
-            _RAISE_FAULT: self._raise_fault,
-            _REFUSE_MODES: self._refuse_modes,
-            _SHOW_MODE: self._show_mode,
-            _MUTE_HEARTBEAT: self._mute,
-            _FALL_SILENT: self._silence_after_the_answer,
-            _BABBLE: self._set_babble,
-            _JUMP: lambda counts: self._axis.jump(int(counts)),
-            _CUT_CABLE: self._cut_cable,
-            _SLIP: self._slip,
-            _CELL_OFF: self._set_cell_off,
-            _PUT_BACK: self._put_back,
-        }
-        readers: dict[int, Callable[[], Value]] = {
-            _CUT_CABLE: lambda: int(self._axis.cable_cut),
-            _SLIP: lambda: min(round(self._axis.slipped_m * 1e3), 0xFFFF),
-            _CELL_OFF: lambda: round(self._axis.cell_off_N),
-        }
-        writers |= {sub: self._counter(sub) for sub in _COUNTED}
-        for sub, writer in writers.items():
-            if (0x2F00, sub) in od:
-                od.on_write(0x2F00, sub, writer)
-        for sub, reader in readers.items():
-            if (0x2F00, sub) in od:
-                od.on_read(0x2F00, sub, reader)
-
-    def reset(self) -> None:
-        """End all faults."""
-        self._left = dict.fromkeys(_COUNTED, 0)
-        self._late.clear()
-        self._muted = False
-        self._babble = 0
-        self._refuse_modes(0)
-        self._show_mode(0)
-        self._update_active()
-
-    def is_silent(self, now: float) -> bool:
-        """Return whether the drive neither receives nor sends at bus time `now`."""
-        return now < self._silent_until
-
-    def ends_silence(self, frame: bytes, node_id: int) -> bool:
-        """End the silence if this frame writes 0 to 2F00h:6; return whether it does.
-
-        A silent drive receives no other frame. The size of the 0 does not matter.
-        """
-        kind = frame[_DATA_AT]
-        zero = pack_frame(_SDO_REQUEST + node_id, bytes((kind,)) + _NO_SILENCE)
-        if kind & _EXPEDITED_MASK != _EXPEDITED or frame != zero:
-            return False
-        self._silent_until = 0.0
-        return True
-
-    def alter_outbox(self, now: float) -> None:
-        """Drop, delay, double or add frames of the outbox, as the active faults require."""
-        self._now = now
-        if now < self._silent_until:
-            self._outbox.clear()
-            return
-        self._do_babble()
-        frames, late = list(self._outbox), self._late
-        self._outbox.clear()
-        for frame in frames:
-            if late and _is_tpdo(frame):
-                # the delayed frame comes before the one that is on time
-                self._outbox += late
-                late.clear()
-            self._filter_frame(frame)
-        for sub, count in self._left.items():
-            if (0x2F00, sub) in self._od:
-                self._od.set(0x2F00, sub, count)
-        self._update_active()
-
-    def _filter_frame(self, frame: bytes) -> None:
-        identifier = int.from_bytes(frame[:4], "little")
-        if self._muted and identifier & _FUNCTION == _ERROR_CONTROL:
-            return
-        if identifier & _FUNCTION == _SDO_ANSWER and self._consume(_VANISH_IN_SDO):
-            if not self._left[_VANISH_IN_SDO]:
-                self._fall_silent()
-        elif _is_tpdo(frame):
-            if self._consume(_DROP_TPDOS):
-                return
-            if self._consume(_DELAY_TPDOS):
-                self._late.append(frame)
-                return
-            if self._consume(_DOUBLE_TPDOS):
-                self._outbox.append(frame)
-        self._outbox.append(frame)
-
-    def _consume(self, sub: int) -> bool:
-        if not self._left[sub]:
-            return False
-        self._left[sub] -= 1
-        return True
-
-    def _do_babble(self) -> None:
-        ms = int(self._now * 1e3)
-        if self._babble and ms != self._last_babble_ms:
-            self._last_babble_ms = ms
-            node_id = self._od.get_int(0x1014, 0, _EMCY) & _NODE
-            self._outbox += [pack_frame(_EMCY + node_id, _BABBLE_FRAME)] * self._babble
-
-    def _update_active(self) -> None:
-        self.active = bool(
-            any(self._left.values())
-            or self._late
-            or self._muted
-            or self._babble
-            or self._now < self._silent_until
-        )
-
-    def _counter(self, sub: int) -> Callable[[Value], None]:
-        def set_count(count: Value) -> None:
-            self._left[sub] = int(count)
-            if count and sub == _VANISH_IN_SDO:
-                self._left[sub] += 1  # the answer to the SDO request itself is not affected
-                self._silence_ms = _FOR_GOOD_MS
-            self._update_active()
-
-        return set_count
-
-    def _raise_fault(self, code: Value) -> None:
-        if code:
-            self._state_machine.trip(int(code))
-
-    def _cut_cable(self, cut: Value) -> None:
-        if not cut:
-            self._axis.mend_cable()
-        elif not self._axis.cut_cable():
-            raise SdoAbort(Abort.HARDWARE_ERROR)
-
-    def _slip(self, millimetres: Value) -> None:
-        if not millimetres:
-            self._axis.mend_cable()
-        elif not self._axis.slip_cable(int(millimetres) * 1e-3):
-            raise SdoAbort(Abort.HARDWARE_ERROR)
-
-    def _set_cell_off(self, newton: Value) -> None:
-        self._axis.cell_off_N = float(newton)
-
-    def _put_back(self, wanted: Value) -> None:
-        if wanted and not self._axis.put_platform_back():
-            raise SdoAbort(Abort.HARDWARE_ERROR)
-
-    def _mute(self, on: Value) -> None:
-        self._muted = bool(on)
-        self._update_active()
-
-    def _set_babble(self, frames_per_ms: Value) -> None:
-        self._babble = int(frames_per_ms)
-        self._update_active()
-
-    def _silence_after_the_answer(self, ms: Value) -> None:
-        self._silence_ms = int(ms)
-        self._left[_VANISH_IN_SDO] = int(bool(ms))
-        self._update_active()
-
-    def _fall_silent(self) -> None:
-        ms = self._silence_ms
-        self._silent_until = self._now + (math.inf if ms == _FOR_GOOD_MS else ms * 1e-3)
-
-    def _refuse_modes(self, how: Value) -> None:
-        self._state_machine.ignore_modes = int(how)
-
-    def _show_mode(self, mode: Value) -> None:
-        self._state_machine.displayed_mode = int(mode)
-        self._state_machine.update()
-
-
-def _is_tpdo(frame: bytes) -> bool:
-    return int.from_bytes(frame[:4], "little") & _FUNCTION in _DEFAULT_TPDO
-
 
 TICK_S = 1e-3
 """Longest step between two ticks of the state machine."""
@@ -319,7 +107,7 @@ class SimDrive(SlaveApplication):
         self.axis = Axis(od, plant, ratings, transmission, quirks, robot)
         self.probes = TouchProbes(self.axis)
         self.state_machine = StateMachine(self.axis, self._slave)
-        self.fault_injection = FaultInjection(od, self.state_machine, self.outbox)
+        self.fault_injection = FaultInjection(self.state_machine, self._slave)
         self._bind_configuration()
         motor = self.axis.motor
         self._log: MotionLog | None = None
@@ -445,6 +233,24 @@ class SimDrive(SlaveApplication):
             tick_s = min(tick_s, self._board.next_change_s())
         timer_s = self._slave.timers.next_due
         return timer_s if timer_s < tick_s else tick_s
+
+    def truth(self) -> dict[str, Any]:
+        """Return the true state of the drive, its motor and its cable."""
+        axis, state_machine = self.axis, self.state_machine
+        return {
+            "node_id": self.node_id,
+            "time_s": axis.time,
+            "power_on": axis.kind != servo.OFF,
+            "nmt": self._slave.nmt_state.name.lower(),
+            "state": state_machine.state.name.lower(),
+            "error_code": self.od.get_int(0x603F),
+            "angle_rad": axis.read("angle"),
+            "velocity_rad_s": axis.read("velocity"),
+            "torque_Nm": axis.read("true_gain") * axis.read("current"),
+            "brake": "applied" if axis.read("brake") else "released",
+            "cable": axis.cable_state,
+            "tension_N": axis.read("winch_tension"),
+        }
 
     def close(self) -> None:
         """Flush and close the truth log."""

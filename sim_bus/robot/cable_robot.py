@@ -278,6 +278,21 @@ class CableRobot:
         return np.array(self.platform[0]["rotation"])
 
     @property
+    def velocity_m_s(self) -> FloatArray:
+        """True velocity of the platform's origin, (3,)."""
+        p = self.platform[0]
+        return np.asarray(p["velocity"] - np.cross(p["spin"], p["rotation"] @ p["com"]))
+
+    def truth(self) -> dict[str, list[float]]:
+        """Return the true pose and motion of the platform, the rotation matrix row by row."""
+        return {
+            "position_m": self.position_m.tolist(),
+            "rotation": self.rotation.ravel().tolist(),
+            "velocity_m_s": self.velocity_m_s.tolist(),
+            "spin_rad_s": self.platform[0]["spin"].tolist(),
+        }
+
+    @property
     def tension_N(self) -> FloatArray:
         """True tension of each cable at its winch, (n,)."""
         return np.array(self.motors["winch_tension"])

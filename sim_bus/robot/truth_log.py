@@ -255,15 +255,14 @@ class BoardPose:
 
     def append(self, _sync_index: int, time_s: float, _truth: tuple[float, ...]) -> None:
         """Publish the present pose and motion of the platform's frame."""
-        p, robot = self._robot.platform[0], self._robot
-        lever = np.cross(p["spin"], p["rotation"] @ p["com"])
+        robot = self._robot
         self._board.publish(
             PlatformState(
                 time_s,
                 tuple(robot.position_m.tolist()),
                 tuple(robot.rotation.ravel().tolist()),
-                tuple((p["velocity"] - lever).tolist()),
-                tuple(p["spin"].tolist()),
+                tuple(robot.velocity_m_s.tolist()),
+                tuple(robot.platform[0]["spin"].tolist()),
             )
         )
 

@@ -50,7 +50,7 @@ from cdpr_tools.client.client import (
 from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
-from cdpr_tools.composition.fault_injection import InjectionAccess
+from cdpr_tools.composition.fault_injection import fault_access
 from cdpr_tools.errors import BAD_INPUT, BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.processes import module_command
@@ -406,7 +406,7 @@ class _Remote:
             robot = load_robot(self.description["reference"])
             one, buses = robot.axes[axis], self.status()["buses"]
             url = BusUrl.parse(str(buses[one.bus]["url"]))
-            with InjectionAccess(robot, one, url) as access:
+            with fault_access(robot, one, url) as access:
                 access.inject(fault, None if value is None else str(value))
 
     def end(self) -> None:

@@ -11,22 +11,20 @@ from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import ProfileError, Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_profiles.errors import printable
 from cdpr_profiles.robot import robot_of_winch
+from cdpr_sim_bus.cia402.faults import FAULTS, MEND
 from cdpr_tools.command_group import ROBOT_VARIABLE
-from cdpr_tools.composition.fault_injection import (
-    MEND,
-    InjectedFault,
-    InjectionAccess,
-    fault_words,
-)
+from cdpr_tools.composition.fault_injection import fault_access, named_fault
 from cdpr_tools.errors import BadInputError
 
 LIST = "list"
-_FAULTS = [fault for fault in InjectedFault if fault is not InjectedFault.PUT_BACK]
+_USUAL = ", ".join(
+    f"{fault.usual} {fault.unit} ({name})" for name, fault in FAULTS.items() if fault.unit
+)
 
 if TYPE_CHECKING:
     FaultWord = str
 else:
-    FaultWord = StrEnum("FaultWord", [(word, word) for word in (*InjectedFault, MEND, LIST)])
+    FaultWord = StrEnum("FaultWord", [(word, word) for word in (*FAULTS, MEND, LIST)])
 
 app = typer.Typer()
 
@@ -44,18 +42,15 @@ def fault(
     what: Annotated[
         FaultWord,
         typer.Argument(
-            help=f"Fault to inject immediately: {', '.join(_FAULTS)}; {MEND}: repair everything; "
-            f"{InjectedFault.PUT_BACK}: carry the platform back to where it started; {LIST}: show "
-            "what is broken.",
+            help=f"Fault to inject immediately: {', '.join(FAULTS)}; {MEND}: repair everything; "
+            f"{LIST}: show what is broken.",
             metavar="FAULT",
         ),
     ],
     value: Annotated[
         str | None,
         typer.Argument(
-            help="Size of the fault: mm of slip (default 100), counts of the jump (500), error "
-            "code of the drive (0x7305), ms of silence (default 65535: permanent), N added "
-            "to a load cell (40).",
+            help=f"Size of the fault, by default {_USUAL}.",
             metavar="VALUE",
         ),
     ] = None,
@@ -74,9 +69,9 @@ def fault(
 ) -> None:
     """Break a running simulated robot: a cable, an encoder, a drive; or mend it.
 
-    The command writes object 2F00h of the simulated drives while the robot's master keeps
-    running. For `pre-operational` it sends the NMT command. No controller reads what is broken from
-    the simulator.
+    The command orders it from the simulator, beside the frames of the bus, while the robot's
+    master keeps running. On a virtual CAN interface it writes object 2F00h of the simulated drives.
+    No controller reads what is broken from the simulator.
     """
     profile, daemon = _profile(machine, by_daemon=not bus)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
@@ -88,9 +83,9 @@ def fault(
     clears = "`cdpr drive reset`" if isinstance(profile, Winch) else "`cdpr ack`"
     lines = []
     for one in axes:
-        with InjectionAccess(robot, one, urls[one.bus]) as access:
+        with fault_access(robot, one, urls[one.bus]) as access:
             if not shows:
-                lines.append(f"{one.name}: {fault_words(what, access.inject(what, value))}")
+                lines.append(f"{one.name}: {named_fault(what).text(access.inject(what, value))}")
                 continue
             found, code = access.injected(), access.fault_code()
             if what == MEND:

@@ -19,6 +19,7 @@ from cdpr_sim_bus.bus.server import FleetBus, serve, serve_fleet
 from cdpr_sim_bus.canopen.lss import UNCONFIGURED
 from cdpr_sim_bus.canopen.store import StoreError
 from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.cia402.fault_bench import FaultBench
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.frame import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
@@ -137,12 +138,13 @@ def up(
             if camera is not None and shared is not None:
                 described = plant if "camera" in truth.model_fields_set else None
                 stack.callback(OwnCamera(camera, shared.path, described).stop)
+        bench = FaultBench(drives)
         log, text = _frame_log(frame_log), None if truth_log is None else str(truth_log)
         if isinstance(profile, Winch):
             serve(
                 *(drives, str(urls[""])), mode=mode, bitrate=profile.bitrate_bit_s, truth_log=text,
                 frame_log=log, until_stdin_ends=exit_with_stdin, slcan=slcan,
-                socketcand_port=socketcand,
+                socketcand_port=socketcand, bench=bench,
             )  # fmt: skip
             return
         fleet = [
@@ -156,7 +158,7 @@ def up(
         ]
         serve_fleet(
             *(profile.reference, fleet), mode=mode, until_stdin_ends=exit_with_stdin,
-            frame_log=log, truth_log=text,
+            frame_log=log, truth_log=text, bench=bench,
         )  # fmt: skip
 
 

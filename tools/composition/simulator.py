@@ -11,12 +11,14 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO
+from typing import IO, Any
 
 from typing_extensions import override
 
+from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles.robot import Robot
 from cdpr_tools.compiling import NOTICE, pass_on
+from cdpr_tools.composition.fault_injection import SimulatorChannel
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import end_by_stdin, module_command
 
@@ -163,12 +165,14 @@ class LockstepSimulator(OwnSimulator):
         scanner: Path | None = None,
         camera: Path | None = None,
     ) -> None:
+        self._channel: SimulatorChannel | None = None
         self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
         self.folder = Path(self._temporary.name)
         """Folder for temporary files, removed at the end."""
         if truth_log is None and robot.platform is not None:
             truth_log = self.folder / "truth.log"
         self.truth_log = truth_log
+        self._robot = robot
         self.board = None if robot.tension_sensors is None else self.folder / "board"
         super().__init__(
             *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, truth_log),
@@ -178,9 +182,44 @@ class LockstepSimulator(OwnSimulator):
             waits=False,
         )
 
+    def inject(
+        self,
+        fault: str,
+        axis: int | None = None,
+        value: float | None = None,
+        at_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Inject a fault at bus time `at_s`, by default now; return the order with its values.
+
+        `cdpr_sim_bus.cia402.faults` lists the faults; "mend" ends those of an axis, or all. Axes
+        count from 1. The value 0 mends only this fault. Bus time is `truth()["time_s"]`, and the
+        time of a clock that leads the bus. Raises BadInputError for an invalid order.
+        """
+        order = {"fault": fault, "axis": axis, "value": value, "at_s": at_s}
+        return dict(self._ask("fault", order))
+
+    def broken(self) -> list[dict[str, Any]]:
+        """Return what is broken now: `fault`, `axis`, `value`."""
+        return list(self._ask("broken"))
+
+    def truth(self) -> dict[str, Any]:
+        """Return the truth now, for a judge: `time_s`, `drives`, `platform`, `faults`.
+
+        It needs no running loop. Each of `faults` has `fault`, `axis`, `value`, `at_s`, `ended_s`.
+        """
+        return dict(self._ask("truth"))
+
+    def _ask(self, key: str, value: Any = True) -> Any:
+        if self._channel is None:
+            url = next(iter(robot_urls(self._robot, [self.bus]).values()))
+            self._channel = SimulatorChannel(url)
+        return self._channel.ask(key, value)
+
     @override
     def stop(self) -> None:
         """End the simulator, and remove its folder."""
+        if self._channel is not None:
+            self._channel.close()
         super().stop()
         self._temporary.cleanup()
 

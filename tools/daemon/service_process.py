@@ -262,22 +262,19 @@ def inject_fault(settings: RunSettings, axis: int, fault: str) -> str:
     # loaded with the first fault: no real robot needs it
     from cdpr_drivers.robot.robot_buses import robot_urls  # noqa: PLC0415
     from cdpr_profiles import load_robot  # noqa: PLC0415
-    from cdpr_tools.composition.fault_injection import (  # noqa: PLC0415
-        MEND,
-        InjectionAccess,
-        fault_words,
-    )
+    from cdpr_sim_bus.cia402.faults import FAULTS  # noqa: PLC0415
+    from cdpr_tools.composition.fault_injection import fault_access  # noqa: PLC0415
 
     try:
         robot = load_robot(settings.robot)
         if axis >= len(robot.axes):
             raise BadInputError(f"axis {axis}; allowed: 0 to {len(robot.axes) - 1}")
         one = robot.axes[axis]
-        with InjectionAccess(robot, one, robot_urls(robot, settings.buses)[one.bus]) as access:
+        with fault_access(robot, one, robot_urls(robot, settings.buses)[one.bus]) as access:
             amount = access.inject(fault, None)
     except (CommandError, ProfileError) as error:
         raise InjectionError(str(error)) from None
-    return f"{one.name}: {'mended' if fault == MEND else fault_words(fault, amount)}"
+    return f"{one.name}: {FAULTS[fault].text(amount) if fault in FAULTS else 'mended'}"
 
 
 _PATH_OPTIONS: Final = (
