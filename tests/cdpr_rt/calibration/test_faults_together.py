@@ -229,19 +229,6 @@ def test_a_wrong_lens_and_wrong_sizes_of_sheets_or_drums_are_distinguished(
 
 
 @pytest.mark.long
-def test_four_simultaneous_slips_are_reported_with_the_camera_as_alternative() -> None:
-    readings = Readings(_robot())
-    slips = {0: 0.008, 1: 0.005, 2: -0.007, 3: 0.009}
-    for cable, metres in slips.items():
-        readings.slip(cable, 10, metres)
-    outcome = readings.outcome()
-    jumps = {one.cable: one for one in outcome.faults if one.kind == "jump"}
-    assert {one.pose for one in jumps.values()} == {10}
-    assert {cable: -one.size for cable, one in jumps.items()} == pytest.approx(slips, abs=1e-3)
-    assert any("4 cables are off from pose 11 on" in text for text in outcome.objections())
-
-
-@pytest.mark.long
 def test_a_moved_camera_is_reported_as_possible_cause_of_several_slips() -> None:
     readings = Readings(_robot())
     readings.move_camera(10)
@@ -254,9 +241,8 @@ def test_a_moved_camera_is_reported_as_possible_cause_of_several_slips() -> None
     assert ("jump", 6, 14) in {_short(fault) for fault in outcome.faults}
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
-def test_three_faults_are_reported_despite_a_wrong_camera_position(seed: int) -> None:
-    readings = Readings(_robot(seed=seed))
+def test_three_faults_are_reported_despite_a_wrong_camera_position() -> None:
+    readings = Readings(_robot())
     readings.slip(6, 10, 0.008)
     readings.catch(3, 7, 0.025)
     readings.move(5, 10)
@@ -267,16 +253,6 @@ def test_three_faults_are_reported_despite_a_wrong_camera_position(seed: int) ->
         ("jump", 6, 10), ("outlier", 3, 7), ("marker", "5"), ("hand_eye", -1, -1),
     }  # fmt: skip
     assert readings.off_mm(outcome) < 3.5
-
-
-@pytest.mark.long
-def test_a_wrong_lens_is_not_mistaken_for_a_wrong_camera_position() -> None:
-    readings = Readings(_robot())
-    readings.slip(6, 10, 0.008)
-    readings.wrong_lens(1.03)
-    readings.move(5, 10)
-    named = {_short(fault) for fault in readings.outcome().faults}
-    assert named == {("jump", 6, 10), ("lens", -1, -1), ("marker", "5")}
 
 
 def test_exchanged_known_markers_do_not_move_the_calibration() -> None:

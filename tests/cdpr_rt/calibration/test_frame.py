@@ -46,16 +46,13 @@ def test_a_rigidly_moved_fit_is_returned_to_the_frame_of_the_file(robot: str) ->
     assert stays.found.geometry.cable == pytest.approx(moved.geometry.cable, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
-def test_a_camera_keeps_the_frame_of_a_right_file_and_detects_a_wrong_one(
-    seed: int,
-) -> None:
-    right = camera_robot(25, seed, RIGHT, hand_eye_known=False, knowledge=TAPE)
+def test_a_camera_keeps_the_frame_of_a_right_file_and_detects_a_wrong_one() -> None:
+    right = camera_robot(25, 3, RIGHT, hand_eye_known=False, knowledge=TAPE)
     kept = calibrate(right.robot, right.geometry, right.seen, "camera", right.images)
     assert not kept.told_from_file, kept.verdict()
     assert np.linalg.norm(kept.shift_m) < 0.5e-3
     assert kept.absolute.position_mm > 10.0 > kept.predicted_3_sigma_mm
-    wrong = camera_robot(25, seed, WRONG_EXITS, hand_eye_known=False, knowledge=TAPE)
+    wrong = camera_robot(25, 3, WRONG_EXITS, hand_eye_known=False, knowledge=TAPE)
     told = calibrate(wrong.robot, wrong.geometry, wrong.seen, "camera", wrong.images)
     assert told.told_from_file, told.verdict()
 

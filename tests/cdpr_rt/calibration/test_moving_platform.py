@@ -113,7 +113,7 @@ def test_blocks_of_time_verify_a_moving_platform(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_larger_noise_at_rest_is_not_mistaken_for_faults(tmp_path: Path) -> None:
     errors = MovingErrors(length_m=0.003, alike_s=0.0, point_m=0.001)
-    what = moving_robot(uncrossed(tmp_path / "wall.toml"), 8, errors, duration_s=8.0)
+    what = moving_robot(uncrossed(tmp_path / "wall.toml"), 8, errors, duration_s=5.0)
     outcome = calibrated(what, tmp_path, "1", timed=False)
     assert not [fault for fault in outcome.faults if fault.kind in ("jump", "outlier")]
     assert outcome.noise is not None

@@ -134,7 +134,7 @@ def test_a_board_that_differs_from_its_description_is_reported(
     board: Board, flipped: bool, said: str
 ) -> None:
     camera = SimCamera(plant(grids=(), board=BoardPlant(), samples=16))
-    states = random_poses(Box((-0.02, -0.02, 0.4), (0.02, 0.02, 0.45), 15.0), 5, 8)
+    states = random_poses(Box((-0.02, -0.02, 0.4), (0.02, 0.02, 0.45), 15.0), 2, 8)
     images = [camera.grab(state)[:, :: -1 if flipped else 1] for state in states]
     with pytest.raises(CalibrationError, match=f"0 images show the board.*{said}"):
         fit_intrinsics([(f"{k}", np.ascontiguousarray(one)) for k, one in enumerate(images)], board)
