@@ -43,7 +43,7 @@ page: $(STAMP)  ## check and build the operator's page; needs Node.js 20 or late
 	$(BIN)/python -m cdpr_rt.service.openapi > cdpr_rt/page/openapi.json
 	cd cdpr_rt/page && npm ci --no-audit --no-fund --silent && npm run --silent types && npm run --silent check && npm run --silent build
 
-lock:  ## resolve the versions anew (maintainers)
+lock:  ## resolve all versions again (maintainers)
 	$(PYTHON) -m venv build/lock && build/lock/bin/pip install -q uv
 	build/lock/bin/uv pip compile --universal --python-version 3.11 --extra dev --extra docs --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-header --upgrade -o requirements.lock pyproject.toml
@@ -52,6 +52,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "cdpr-rt needs Python 3.11 or later; name one with: make PYTHON=python3.12 ..." >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
+	@echo "downloading and installing packages; this may take minutes without a message ..."
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
 	@# pip would compile on one core, and what nothing here imports
 	@$(BIN)/python -m compileall -qq -j 0 -x '/(ray|tests?)/' $(VENV)/lib || true

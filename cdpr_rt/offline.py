@@ -222,10 +222,8 @@ class Model:
         values = _numbers(name, given)
         fits = values.ndim > 0 and values.shape[-1] == size and np.isfinite(values).all()
         if not fits or shape not in (None, values.shape[:-1]):
-            wanted = f"(..., {size})" if shape is None else (*shape, size)
-            raise InvalidArgument(
-                f"{name}: shape {values.shape}; allowed: finite numbers of shape {wanted}"
-            )
+            wanted = f"(..., {size})" if shape is None else f"{(*shape, size)}"
+            raise _unfit(name, values, wanted)
         return values if shape is None else values.reshape(-1, size)
 
     def tensions(self, position: ArrayLike, wrench: ArrayLike | None = None) -> FloatArray:
@@ -292,9 +290,7 @@ class Model:
         except ValueError:
             wide = np.array(np.nan)
         if not np.isfinite(wide).all():
-            raise InvalidArgument(
-                f"wrench: shape {given.shape}; want finite ({self.d},) or {(*shape, self.d)}"
-            )
+            raise _unfit("wrench", given, f"({self.d},) or {(*shape, self.d)}")
         return wide.reshape(-1, self.d)
 
     def _one(self, position: ArrayLike) -> FloatArray:
@@ -308,12 +304,16 @@ class Model:
         given, k = _numbers("position", position), self._model.positions
         if given.ndim == 0 or given.shape[-1] not in (k, self.d) or not np.isfinite(given).all():
             wanted = f"(..., {k})" + (f" or (..., {self.d})" if self.d > k else "")
-            raise InvalidArgument(
-                f"position: shape {given.shape}; allowed: finite numbers of shape {wanted}"
-            )
+            raise _unfit("position", given, wanted)
         rows = np.zeros((int(np.prod(given.shape[:-1])), self.d))
         rows[:, : given.shape[-1]] = given.reshape(-1, given.shape[-1])
         return rows, given.shape[:-1]
+
+
+def _unfit(name: str, values: FloatArray, wanted: str) -> InvalidArgument:
+    """Return the error for an array that is not finite, or not of the shape `wanted`."""
+    found = f"shape {values.shape}" if np.isfinite(values).all() else "contains nan or infinity"
+    return InvalidArgument(f"{name}: {found}; want finite numbers of shape {wanted}")
 
 
 def _numbers(name: str, given: ArrayLike) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -589,7 +590,7 @@ class Robot:
                 self._settle(program)
         self._started = ""
         if (trouble := progress.get("trouble")) and self.on_status is None:
-            warnings.warn(str(trouble), RuntimeWarning, stacklevel=4)
+            warnings.warn(str(trouble), RuntimeWarning, stacklevel=_level_of_script())
 
     def inject_fault(self, axis: str | int, fault: str, value: int | None = None) -> None:
         """Inject a fault into a simulated axis, given by name or index from 0; "mend" repairs it.
@@ -695,7 +696,7 @@ class Robot:
                 f"{name}: {value!r}; allowed: {size} numbers, one for each {each}"
             ) from None
         if not size:
-            raise InvalidArgument(f"{name}: {self.name} has none; allowed: leave it out")
+            raise InvalidArgument(f"{name}: {self.name} has no {each}; omit it")
         if numbers.shape != (size,):
             raise InvalidArgument(
                 f"{name}: shape {numbers.shape}; allowed: ({size},), one number for each {each}"
@@ -767,6 +768,14 @@ def _positive(name: str, value: float | None) -> float | None:
     if not 0.0 < number < math.inf:
         raise InvalidArgument(f"{name}: {value!r}; allowed: a finite number above 0")
     return number
+
+
+def _level_of_script() -> int:
+    """Return the `stacklevel` with which a warning of this module names the script's line."""
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and frame.f_code.co_filename == __file__:
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _number(value: float | None) -> float:

@@ -103,7 +103,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     folder = path.parent
     if file.node_id == file.master_node_id:
         raise ProfileError(
-            path, "node_id", f"value {file.node_id}; allowed: other than master_node_id"
+            path, "node_id", f"value {file.node_id}; allowed: any but master_node_id"
         )
     return Winch(
         profile=path.stem,

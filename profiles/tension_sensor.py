@@ -151,7 +151,7 @@ class TensionSensors(Profile):
         if (self.amplifier is None) is not (not self.sensors):
             raise ValueError("amplifier and sensors: allowed: both or none")
         if self.amplifier is None and tilt is None:
-            raise ValueError("amplifier: is missing; allowed without one only with an inclinometer")
+            raise ValueError("amplifier: is missing; omit it only if there is an inclinometer")
         if tilt is not None and tilt.unit in [sensor.unit for sensor in self.sensors]:
             raise ValueError(f"inclinometer.unit: {tilt.unit} is that of a load cell")
         if self.stale_after_s < 2 * self.period_s:

@@ -133,6 +133,7 @@ ALIASES = {
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
+    "move --by": "type `cdpr move --relative --to X Y [Z]`, in mm",
     "gui": "`cdpr page` prints the address of a running robot's page for a browser, and "
     "`cdpr run ROBOT --open` starts a robot and opens it",
 }

@@ -521,7 +521,7 @@ def _plain_cost(model: _ByLengths, information: FloatArray, points: Points) -> f
 
 
 def row_slip(measured_m: FloatArray, there_m: FloatArray, std_m: float) -> str:
-    """Return a slip that explains a single point (k,), nan if not measured; empty for none."""
+    """Return the mistake that explains a measured point (k,), or ""; nan: not measured."""
     k = len(measured_m)
     tried = {f"it is in {unit}": mm * measured_m for mm, unit in _UNITS.items()}
     for name, order, sign in _axes(k):

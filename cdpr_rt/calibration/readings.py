@@ -604,7 +604,7 @@ def with_points(
         vector[about] = point.turn_rad[about]
         if not np.isfinite(vector).all():
             needed = ", ".join(_TURNS[about])
-            raise InvalidRequestError(f"a rotation of this robot has the columns {needed}")
+            raise InvalidRequestError(f"a rotation of this robot needs the columns {needed}")
         turn[point.pose] = Rotation.from_rotvec(vector).as_matrix()
         turn_std[point.pose] = point.turn_std_rad
     guessed = bool(points) and all(point.std_guessed for point in points)

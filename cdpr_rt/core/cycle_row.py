@@ -39,7 +39,7 @@ class CycleField:
     live: bool = False
     """Whether the live view shows it: angles in degrees, wall times as the longest one in ms."""
     metric: str = ""
-    """Name of the Prometheus metric without prefix, "" for none; wall times are histograms."""
+    """Name of the Prometheus metric without prefix, or ""; wall times are histograms."""
     labels: type[LoopState] | type[Reaction] | None = None
     """Enumeration that names its numbers."""
 

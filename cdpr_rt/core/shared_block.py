@@ -162,7 +162,9 @@ class SharedBlock:
             raise SharedBlockError("the shared memory was made by another version")
         n, capacity = int(row["axes"]), int(row["capacity"])
         if not 1 <= n <= MOST_AXES or sum(_sizes(n, capacity)) != size:
-            raise SharedBlockError(f"the shared memory has {size} bytes, not those of its axes")
+            raise SharedBlockError(
+                f"the shared memory has {size} bytes, which does not fit {n} axes"
+            )
         return cls(fd, n, capacity)
 
     # -- texts: the loop writes, others read

@@ -84,7 +84,7 @@ def _moved(s: Subject, q: FloatArray) -> FloatArray:
 
 
 def turned_by_friction(s: Subject) -> str:
-    """Return about which axis friction turns the platform too far, as text; "" for none.
+    """Return about which axis friction turns the platform too far, as text, or "".
 
     Usual friction of standard deviation f (n,) in each winch turns it by that of K^-1 J^T f until
     the integral part has overcome it. The result is "" if the cables can hold the platform with

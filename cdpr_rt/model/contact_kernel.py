@@ -1,8 +1,8 @@
 """Kernels of clearances at poses, and of the first contact on a straight way, without gaps.
 
 The method is that of Tremblay (thesis), eqs. (3.27), (3.36), (3.37), with conservative advancement.
-At a position on the way, each pair of things has a distance d, along the unit vector n between its
-nearest points. Both things of a pair are convex. They stay more than the clearance c apart until an
+At a position on the way, each pair of bodies has a distance d, along the unit vector n between its
+nearest points. Both bodies of a pair are convex. They stay more than the clearance c apart until an
 end of one of them has moved along n by d - c plus its distance behind the nearest point. With the
 speed g of an end along n and a bound h of its acceleration, both per share s of the way, they stay
 apart for
@@ -20,7 +20,7 @@ formula the acceleration is at most |TURN|² |b|.
     points  (4, 3)       ends of the segments of a pair, without the parts that are left out
     near    (2, 3)       the nearest points of the pair
 
-Next to a point that a cable shares with the other thing, `least` metres of it are left out, but at
+Next to a point that a cable shares with the other body, `least` metres of it are left out, but at
 most half of the cable. The bits EXIT and ANCHOR of TRIMMED mark the ends at which this is done.
 """
 
@@ -39,7 +39,7 @@ from cdpr_rt.model.pose import exponential
 
 # Kernels of distances between segments and boxes, in m; exact except for rounding. Points are (3,).
 # A box (2, 3) has its least and its greatest coordinates as rows. The nearest points are written to
-# `near` (2, 3): the first row belongs to the first-named thing.
+# `near` (2, 3): the first row belongs to the first body.
 
 _CUTS = 60
 _PARALLEL = 1e-12
@@ -236,7 +236,7 @@ of each other if the angle between them is more than 1/10 rad (5.7 deg)."""
 
 
 class Scene(NamedTuple):
-    """Cables, platform and boxes of a robot, and the pairs of these things to be checked."""
+    """Cables, platform and boxes of a robot, and the pairs of these bodies to be checked."""
 
     geometry: FloatArray
     """(10, n), as in `cable_kernel`."""
@@ -356,7 +356,7 @@ TOUCH_m: Final = 1e-6
 _LEAVING: Final = 0.9
 """Share of its initial distance that a pair in contact at the start has to keep."""
 _LEAVES: Final = 4.0
-"""Longest motion of the platform after which overlapping things must be apart, in clearances."""
+"""Longest motion of the platform after which overlapping bodies must be apart, in clearances."""
 _WATCHES: Final = 32
 """Number of checks during that motion."""
 _DEEPER: Final = 0.05
@@ -382,7 +382,7 @@ class _Look(NamedTuple):
     """(7, n): bounds of speeds and accelerations of each cable's ends."""
     moves: FloatArray
     """(4, 3): distance behind the nearest point, speed along n, and acceleration of both ends of
-    both things of the pair."""
+    both bodies of the pair."""
 
 
 @jit
@@ -635,7 +635,7 @@ def _apart_at_anchor(scene: Scene, pair: IntArray, way: FloatArray, rates: Float
 def _write_moves(
     pair: IntArray, row: int, apart: float, trim: float, way: FloatArray, look: _Look
 ) -> None:
-    """Write how both ends of a pair's first or second (`row` 1) thing, a cable, may move."""
+    """Write how both ends of a pair's first or second (`row` 1) body, a cable, may move."""
     pose, twist, points, near, rates, moves = look
     i, sign = pair[FIRST + row], (1.0 - 2.0 * row) / apart
     nx, ny = sign * (near[1, 0] - near[0, 0]), sign * (near[1, 1] - near[0, 1])
@@ -671,7 +671,7 @@ def _write_moves(
 
 
 # Kernel for every cycle: whether a short straight way leads into contact. Let a pair be d0 and d1
-# apart at the ends of a part of the way, and let the points of its two things together move by at
+# apart at the ends of a part of the way, and let the points of its two bodies together move by at
 # most l. Then the least distance between the ends is at least (d0 + d1 - l) / 2. If that is too
 # little, the way is divided into more parts.
 
@@ -733,5 +733,5 @@ def nears(
 
 @jit
 def _together(pair: IntArray, moved: float) -> float:
-    """Return the sum of the motions of a pair's things if the platform's points move by `moved`."""
+    """Return the sum of the motions of a pair's bodies if the platform's points move by `moved`."""
     return moved if pair[KIND] in (BODY_BOX, CABLE_BOX) else 2.0 * moved

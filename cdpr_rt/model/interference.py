@@ -32,7 +32,7 @@ _EVERYWHERE_m: Final = 1e4
 
 @dataclass(frozen=True)
 class Contact:
-    """The first position on a way at which two things are closer than the clearance."""
+    """The first position on a way at which two bodies are closer than the clearance."""
 
     position: FloatArray
     """Position of the platform, (d,): coordinates, then rotation vector."""
@@ -44,7 +44,7 @@ class Contact:
     things: tuple[str, str]
     distance_m: float
     known: bool
-    """True if the two things come this near, False if only the proof of clearance failed."""
+    """True if the two bodies come this near, False if only the proof of clearance failed."""
 
     def __str__(self) -> str:
         text = in_words(self.things, self.distance_m)
@@ -57,7 +57,7 @@ class Interference:
     """Contacts among cables, the platform's body and boxes of the room.
 
     Two things are in contact if they are closer than the clearance. A cable is the straight centre
-    line of its free part, so the clearance has to cover its sag. If two things share a point, or
+    line of its free part, so the clearance has to cover its sag. If two bodies share a point, or
     come closer than the clearance at an exit or anchor point, the cable is not checked near that
     point, for a length of ten clearances. In a planar robot the cables run in layers beside each
     other and the body, so they are checked against the boxes of the room only. An object must be
@@ -112,7 +112,7 @@ class Interference:
         return clearances, nearest
 
     def contact(self, pose: FloatArray) -> str:
-        """Return the contact at a pose (4, 3) as text, "" for none."""
+        """Return the contact at a pose (4, 3) as text, or ""."""
         clearance, pair = self.clearances(pose[None])
         if clearance[0] >= self.clearance_m:
             return ""
@@ -122,7 +122,7 @@ class Interference:
         """Return a pair that comes into contact on a short straight way between positions (d,).
 
         Returns -1 for none. The method is meant for every cycle: it allocates no arrays, and may
-        report contact if things only pass each other quickly and closely. A pair in contact at the
+        report contact if bodies only pass each other quickly and closely. A pair in contact at the
         start may separate.
         """
         return self._on_way(start, end, _PARTS)
@@ -166,7 +166,7 @@ class Interference:
             self._way[row, column], self._way[row + 1, column] = start[k], end[k] - start[k]
 
     def things(self, pair: int) -> tuple[str, str]:
-        """Return the names of a pair's things."""
+        """Return the names of a pair's bodies."""
         kind, first, second, _ = (int(x) for x in self.pairs[pair])
         one = "platform" if kind == kernel.BODY_BOX else f"cable {first + 1}"
         if kind == kernel.CABLES:
@@ -195,7 +195,7 @@ class Interference:
 
 
 def in_words(things: tuple[str, str], distance_m: float) -> str:
-    """Return a text that says how near two things come to each other."""
+    """Return a text that says how near two bodies come to each other."""
     if all(thing.startswith("cable ") for thing in things):
         who = f"cables {things[0][6:]} and {things[1][6:]}"
     else:

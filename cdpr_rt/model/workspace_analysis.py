@@ -60,7 +60,7 @@ class Criterion:
         """Return the contact-free shares (m,) of straight ways from a centre to positions.
 
         Orientation is constant on a way; the share is that of the worst orientation. It is 0 if
-        things are in contact at the centre. Whole ways are checked because crossing cables are in
+        bodies are in contact at the centre. Whole ways are checked because crossing cables are in
         contact for a few millimetres only: contact checks at single positions, however dense, could
         miss the crossing.
         """

@@ -164,7 +164,7 @@ class CellCheck:
 
     @property
     def trouble(self) -> str:
-        """Text on the wrong cell and its largest error, "" for none; until `clear`."""
+        """Text on the wrong cell and its largest error, or ""; until `clear`."""
         if self._named < 0:
             return ""
         return (

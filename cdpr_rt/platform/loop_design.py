@@ -685,9 +685,9 @@ class DesignedLoop:
 
     @property
     def growing_modes(self) -> tuple[Mode, ...]:
-        """The modes with cables that damp only by LITTLE_DAMPING_s.
+        """The modes if the cables have only the damping LITTLE_DAMPING_s.
 
-        Empty if no mode grows in that case, or if the cables damp no more than that anyway.
+        Empty if no mode grows with this damping, or if the robot's cables have no more.
         """
         return self._judged.growing
 

@@ -107,7 +107,7 @@ class Oscillation:
 
     @property
     def trouble(self) -> str:
-        """Text on the winch that oscillates, "" for none; until `clear`."""
+        """Text on the winch that oscillates, or ""; until `clear`."""
         if self._found is None:
             return ""
         case, i, frequency_Hz = self._found

@@ -68,7 +68,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
 
 
 def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> str:
-    """Return the likely mistake of units, by the size of a path inside the box; "" for none."""
+    """Return the likely mistake of units, by the size of a path inside the box, or ""."""
     points = path.points[:, : path.coordinates.positions]
     size, room = np.ptp(points, axis=0), high_m - low_m
     if not size.any() or (size > _SMALL * room).any():

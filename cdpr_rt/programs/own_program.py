@@ -218,11 +218,12 @@ def checked_programs(found: Iterable[tuple[str, Any]], taken: Iterable[str]) -> 
         if name in names:
             raise CodeError(f"{reference}: name: {name!r} is taken; allowed: another name")
         for key, bounds in program.arguments.items():
-            low, high, default = (*bounds, *[np.nan] * 3)[:3]
-            if not _KEY.fullmatch(key) or not low <= default <= high or len(bounds) != 3:
+            three = tuple(np.atleast_1d(bounds))
+            low, high, default = (*three, *[np.nan] * 3)[:3]
+            if not _KEY.fullmatch(key) or len(three) != 3 or not low <= default <= high:
                 raise CodeError(
-                    f"{reference}: arguments: {key!r}: {bounds!r}; allowed: a name of letters, "
-                    "digits and _, with its least and largest value and the default between them"
+                    f"{reference}: arguments: {key!r}: {bounds!r}; use letters, digits and _ for "
+                    "the name, and give three numbers: lowest, highest, default"
                 )
         names.add(name)
         programs.append(program)

@@ -308,7 +308,7 @@ class SlackTakeUp:
         )
 
     def dragged(self, position_rad: FloatArray) -> str:
-        """Return the tight cable that was reeled in too far, as text, "" for none.
+        """Return the tight cable that was reeled in too far, as text, or "".
 
         When cables are reeled in together, friction may have held a slack one. Such a cable was not
         tight if it was reeled in no farther in total than the others.
@@ -347,7 +347,7 @@ class SlackTakeUp:
         return why
 
     def _uneven(self, position_rad: FloatArray, pulled: bool) -> str:
-        """Return the cable with so much more slack that the platform may have moved, "" for none.
+        """Return the cable with so much more slack that the platform may have moved, or "".
 
         Slack is the length of cable reeled in so far, without its stretch. A winch that did not
         turn while the others became tight may turn only when all are `pulled` harder.

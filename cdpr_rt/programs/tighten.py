@@ -108,7 +108,7 @@ class LettingGo:
         self._inwards_m_s = np.zeros(cable_m.size)
 
     def runs_in(self) -> str:
-        """Return the winch that reels in faster than possible with a tight cable, "" for none."""
+        """Return the winch that reels in faster than possible with a tight cable, or ""."""
         velocity_rad_s = self._parts.estimator.estimate.velocity_rad_s
         np.multiply(velocity_rad_s, self._cable, out=self._inwards_m_s)
         i = int(self._inwards_m_s.argmin())
@@ -192,7 +192,7 @@ class LengthsAtHome:
         self._rising_rad[:] = feedback.position_rad
 
     def slack_before(self, feedback: AxisFeedback, harder: float) -> str:
-        """Return the cable that was not tight when angles were stored, as text, "" for none.
+        """Return the cable that was not tight when angles were stored, as text, or "".
 
         The cables are now pulled `harder`: a tight cable is then reeled in only by its stretch. The
         check is not needed if lengths can contradict each other.

@@ -282,7 +282,9 @@ class Cia402RailAxis:
         """Return whether the target is reached; raises RailError if the drive lags or is off."""
         word = self._statusword()
         if state_of(word) != State.OPERATION_ENABLED:
-            raise self._wrong(f"left operation enabled and is {state_of(word).label}")
+            raise self._wrong(
+                f"left state operation enabled; it is in state {state_of(word).label}"
+            )
         if word & _FOLLOWING_ERROR:
             raise self._wrong("reports a following error")
         return bool(word & _TARGET_REACHED)
@@ -337,7 +339,7 @@ class Cia402RailAxis:
                 return
             if self._clock.now_s > deadline or state == State.FAULT:
                 code = fault_text(self._network.read_int(self._node, 0x603F))
-                raise self._wrong(f"is {state.label}, not {target.label} ({code})")
+                raise self._wrong(f"is in state {state.label} instead of {target.label} ({code})")
             self._write(0x6040, int(CONTROLWORD_TABLE[target, state]))
             self._clock.sleep(_LOOK_S)
 

@@ -102,8 +102,8 @@ def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
         raise ConfigurationError(
-            f"{paths}: harmonic.table_Nm of {' and '.join(map(str, lengths))} values; "
-            "allowed: the same number for every axis"
+            f"{paths}: harmonic.table_Nm has {' and '.join(map(str, lengths))} values; "
+            "every axis needs the same number"
         )
     return found
 

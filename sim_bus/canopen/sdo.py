@@ -126,7 +126,7 @@ class BlockUpload:
         server.send(_LONG.pack(0xC2 | self._crc, entry.index, entry.sub, len(data)))
 
     def handles(self, command: int) -> bool:
-        """Accept the other block upload requests."""
+        """Return whether this is a block upload request other than the first."""
         return command >> 5 == 5 and command & 0x03 != 0
 
     def step(self, data: bytes) -> None:

@@ -383,9 +383,9 @@ def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:
     points = np.asarray(values, float)
     most = MOST_CABLES if n is not None else MOST_FEET
     if points.ndim != 2 or points.shape[1] not in (2, 3) or not 0 < len(points) <= most:
-        raise ValueError(f"{what}: {points.shape}; allowed: (n, 2) or (n, 3), n up to {most}")
+        raise ValueError(f"{what}: shape {points.shape}; allowed: (n, 2) or (n, 3), n up to {most}")
     if n is not None and len(points) != n:
-        raise ValueError(f"{what}: {len(points)}; allowed: one for each of {n} axes")
+        raise ValueError(f"{what}: {len(points)} points; allowed: {n}, one for each axis")
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 

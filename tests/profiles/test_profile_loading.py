@@ -307,7 +307,7 @@ def test_a_winch_finds_profiles_in_its_folder_before_shipped_ones(tmp_path: Path
 def test_the_node_id_of_the_master_is_rejected(tmp_path: Path):
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     path = _write(tmp_path, source, _read(source) | {"node_id": 127})
-    with pytest.raises(ProfileError, match="node_id: value 127; allowed: other than master"):
+    with pytest.raises(ProfileError, match="node_id: value 127; allowed: any but master"):
         cdpr_profiles.load_winch(path)
 
 

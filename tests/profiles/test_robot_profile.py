@@ -63,7 +63,7 @@ def test_winches_inherit_node_id_bit_rate_and_period_from_the_robot(tmp_path: Pa
         ({"bus": "left"}, "buses[1].name", "axes[1].node_id: value 2; allowed: each node id once"),
         ({"bus": "rigth"}, "buses[1].name", "allowed: a bus with at least one axis"),
         ({"bus": "rigth"}, "buses[1].name", "axes[0].bus: value 'rigth'; allowed: left, right"),
-        ({"top": "master_node_id = 2"}, "axes[0].node_id", "other than master_node_id"),
+        ({"top": "master_node_id = 2"}, "axes[0].node_id", "any but master_node_id"),
         ({"node": 128}, "axes[0].node_id", "less than or equal to 127"),
         ({"winch": "winch-mpp0932d"}, "axes[0].winch", "did you mean 'winch-mpp0923d'?"),
         ({"top": "sync_periods = 1"}, "sync_periods", "did you mean 'sync_period_s'?"),

@@ -131,9 +131,7 @@ class PlainControl:
         """Copy the bandwidth and the platform's pose from `ours`; raises GeometryError."""
         model, platform, axes = ours.model, ours.model.platform, robot.axes
         if any(platform.pulley_radius_m):
-            raise GeometryError(
-                f"{robot.path}: this robot has pulleys, but the NumPy baseline computes only eyes"
-            )
+            raise GeometryError(f"{robot.path}: the NumPy baseline computes no pulleys")
         self.T, self.bandwidth_rad_s = robot.sync_period_s, ours.gains.bandwidth_rad_s
         self.a = np.array([in_space(point) for point in platform.exit_points_m])
         self.b = np.array([in_space(point) for point in platform.anchor_points_m])

@@ -124,7 +124,7 @@ def _ours(group: AxisGroup) -> Iterator[Iterator[Work]]:
     def cycle() -> None:
         group.sync()
         if group.receive() < group.n:
-            raise BusError(f"ours: an axis did not answer: {group.faults()}")
+            raise BusError(f"AxisGroup: an axis did not answer: {group.faults()}")
         group.transmit()
 
     with closing(group):

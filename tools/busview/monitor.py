@@ -104,7 +104,7 @@ _MORE_BITS_EXTENDED = 25
 
 @dataclass
 class Summary:
-    """Counts records; the load is relative to `bitrate_bit_s`."""
+    """Counts of records, and the load of a bus with `bitrate_bit_s`."""
 
     bitrate_bit_s: int
     frames: int = 0

@@ -205,7 +205,7 @@ def _require_other_folder(folder: Path) -> None:
 
 def _judged(robot: Robot, known: Before | None, data: CalibrationData) -> Check:
     if len(data.poses) <= _LEAST:
-        raise WorkFailedError(f"{len(data.poses) - 1} poses of {POSES} only: {data.left_out[-1]}")
+        raise WorkFailedError(f"only {len(data.poses) - 1} of {POSES} poses: {data.left_out[-1]}")
     geometry = CableGeometry.of(robot)
     seen = data.observations(robot, geometry.model)
     if known is not None:

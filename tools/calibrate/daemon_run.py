@@ -74,8 +74,8 @@ def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> R
         robot = calibrated(robot)
     elif description["calibration"] is not None:
         raise BadInputError(
-            f"{robot.profile} runs with a calibration in force, and its lengths count by that; "
-            f"allowed: by its file: cdpr calibrate undo {robot.reference}, then start it again"
+            f"{robot.profile} runs with an adopted calibration, which changes its lengths; undo it "
+            f"with `cdpr calibrate undo {robot.reference}`, then start the robot again"
         )
     if description["geometry_sha256"] != geometry_sha256(robot):
         what = "the file or its calibration " if as_calibrated else ""
@@ -108,8 +108,8 @@ class DaemonPoses:
         off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
         if not self.data.poses and off_m > platform.home_tolerance_m:
             raise BadInputError(
-                f"the platform is {1e3 * off_m:.0f} mm from home; allowed for the first pose: "
-                "home, where it stands after `cdpr lower`, `cdpr tighten`"
+                f"the platform is {1e3 * off_m:.0f} mm from home, where the first pose must be; "
+                "run `cdpr lower` and `cdpr tighten`"
             )
 
     def add(self, reading: PoseReading, counted_m: FloatArray) -> None:
@@ -338,8 +338,8 @@ def require_points_of(poses: int, path: Path) -> None:
     last = max((point.pose + 1 for point in load_points(path)), default=0)
     if last > poses:
         raise BadInputError(
-            f"{path}: has a point of pose {last}, where {poses} were read: of an earlier run; "
-            "allowed: another --out, or remove it"
+            f"{path}: has a point of pose {last}, but only {poses} poses were read; it is from an "
+            "earlier run: choose another --out, or remove the file"
         )
 
 

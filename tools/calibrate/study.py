@@ -219,7 +219,7 @@ def held_poses(robot: str, count: int, seed: int) -> FloatArray:
     """Return random poses (N, 4, 3) in the frame, turned by up to 30 deg, that the cables hold."""
     profile = load_robot(robot)
     if profile.platform is None or len(profile.platform.controlled) != 6:
-        raise BadInputError(f"{robot}: allowed: a robot whose platform has six directions")
+        raise BadInputError(f"{robot}: the study needs a platform with six controlled directions")
     model, rng = platform_model_of(profile), np.random.default_rng(seed)
     workspace = model.workspace(0.0, 0.0)
     exits = np.array(profile.platform.exit_points_m)

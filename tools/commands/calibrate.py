@@ -527,7 +527,7 @@ def check(
         with open_daemon(name, socket, url, key_file) as daemon:
             found = checks.checked_running(out, profile, daemon, camera, seed, folder)
     elif camera is not None:
-        raise BadInputError("--camera: allowed: with --running")
+        raise BadInputError("--camera: allowed only with --running")
     else:
         found = checks.checked(out, profile, plant, scanner, seed, folder)
     out.say(*checks.lines(found, profile))

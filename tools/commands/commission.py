@@ -181,7 +181,7 @@ def commission(
 
 def _only(buses: Sequence[str] | None) -> str:
     if not buses or len(buses) > 1:
-        raise BadInputError("--bus: allowed: one, such as simbus: or socketcan:can0, for a winch")
+        raise BadInputError("--bus: give one URL for a winch, such as simbus: or socketcan:can0")
     return buses[0]
 
 

@@ -90,7 +90,7 @@ class PlatformMove:
             poses["home"] = platform["home_m"]
         if to in poses:
             if self.relative:
-                raise BadInputError(f"--to {to}: a pose; allowed: without --relative")
+                raise BadInputError(f"--to {to}: is a pose, not a distance; omit --relative")
             return list(poses[to])
         if to == "home":
             raise BadInputError(
@@ -161,7 +161,9 @@ def jog(
     """Turn axes at a constant speed for a while, or move a platform by one step."""
     if (step := _step(daemon, axes)) is not None:
         if cable or seconds is not None:
-            raise BadInputError(f"{' '.join(axes)}: allowed: without --cable and --seconds")
+            raise BadInputError(
+                f"{' '.join(axes)}: is a step of the platform; omit --cable and --seconds"
+            )
         with in_typed_words("jog", " ".join(axes)):
             run_to_end(daemon, out, "pose", step.arguments(daemon), arrived=True)
         return

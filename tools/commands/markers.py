@@ -342,7 +342,7 @@ def map_command(
     """Make a map of markers from images of them, and report its accuracy and any problems."""
     out = Output(as_json)
     if not folder.is_dir() or not any(folder.iterdir()):
-        raise BadInputError(f"{folder}: allowed: a folder with images")
+        raise BadInputError(f"{folder}: is not a folder with images")
     described = _sheets(sheets, size_mm, dictionary)
     intrinsics = CameraIntrinsics.load_file(camera or folder / "camera.toml")
     sightings = _sightings(folder, described, intrinsics, out)

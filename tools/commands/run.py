@@ -312,7 +312,7 @@ def settings_for(
     if http is not None and no_page:
         raise BadInputError("--http and --no-page: give only one of them")
     if stream is not None and no_stream:
-        raise BadInputError("--stream and --no-stream: one of them")
+        raise BadInputError("--stream and --no-stream: give only one of them")
     own = own or OwnCodeOptions()
     own.require_use(robot, allow_code=allow_code)
     own_simulator = starts_own_simulator(bus or ())

@@ -130,8 +130,8 @@ def write_passes(rows: Row, axis: SweptAxis, paths: Paths) -> list[Path]:
     fast = [move for move in moves if move.start >= last]
     if (len(sweeps), len(fast)) != (2, 2 * len(_FAST_LEGS)):
         raise WorkFailedError(
-            f"{axis.name}: {len(sweeps)} legs of a sweep and {len(fast)} fast turns recorded; "
-            f"2 and {2 * len(_FAST_LEGS)} were run"
+            f"{axis.name}: the recording has {len(sweeps)} of 2 sweep legs and {len(fast)} of "
+            f"{2 * len(_FAST_LEGS)} fast turns"
         )
     written = []
     for name, some in (("sweep", sweeps), ("fast", fast)):

@@ -242,7 +242,9 @@ def end_leftover_processes(robot: str | None, socket: Path | None) -> list[str]:
     launchers = [(path, pid) for path in locks if (pid := launcher_pid(path)) is not None]
     if len(launchers) > 1 and robot is None:
         names = ", ".join(path.stem for path, _ in launchers)
-        raise BadInputError(f"{len(launchers)} daemons start: choose one by --robot ({names})")
+        raise BadInputError(
+            f"{len(launchers)} daemons are starting; choose one by --robot ({names})"
+        )
     return [_end_start(path, pid) for path, pid in launchers[:1]]
 
 

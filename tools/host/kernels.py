@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import multiprocessing
 import os
+import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -50,13 +51,17 @@ def compile_kernels(processes: int) -> bool:
     `processes` run in parallel and report their progress on standard error. Stop and return False
     if the machine code of a kernel cannot be kept.
     """
+    parts, done = sum(map(len, _STAGES)), 0
     # new processes inherit no lock or thread of this one
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         for stage in _STAGES:
-            for task in [pool.submit(compile_with, what, task) for what, task in stage.items()]:
+            tasks = {pool.submit(compile_with, what, task): what for what, task in stage.items()}
+            for task in as_completed(tasks):
                 if not task.result():
                     pool.shutdown(cancel_futures=True)
                     return False
+                done += 1
+                print(f"part {done} of {parts} is compiled: {tasks[task]}", file=sys.stderr)
     return True
 
 

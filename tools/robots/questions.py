@@ -505,7 +505,7 @@ def axis_names(answers: Answers) -> list[str]:
 
 def _name(text: str, _: Answers) -> str:
     if not text.strip() or not text.isprintable():
-        raise AnswerError("allowed: a text of one line")
+        raise AnswerError("allowed: one line of text")
     return text.strip()
 
 

@@ -53,7 +53,9 @@ def begin(settings: ExperimentSettings, folder: Path) -> None:
     with os_error_as(BadInputError, str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInputError(f"{folder}: not empty; allowed: a new folder, or an experiment's")
+            raise BadInputError(
+                f"{folder}: is not empty; choose a new folder or one of an experiment"
+            )
         path.write_text(to_json(asdict(settings), indent=1), encoding="utf-8")
 
 

@@ -141,7 +141,7 @@ def of_a_run(told: StandingDaemon, folder: Path) -> None:
         (shift("reference", "bench-2"), BadInputError, "has no platform"),
         (shift("calibration", {"version": 1}), BadInputError, "cdpr calibrate undo planar-4"),
         (shift("geometry_sha256", "0"), BadInputError, "changed since the robot"),
-        (away, BadInputError, "mm from home; allowed for the first pose: home"),
+        (away, BadInputError, "mm from home, where the first pose must be"),
         (unpowered, WorkFailedError, "the cables do not hold the platform .ready, hold."),
         (lowered, WorkFailedError, "the cables do not hold the platform .active, hold."),
         (hung, WorkFailedError, "the loop has run no cycle for"),

@@ -325,7 +325,7 @@ def test_a_check_requires_a_platform_held_at_home(file: Robot, tmp_path: Path) -
     out, folder = Output(as_json=False), tmp_path / "out"
     daemon = Calibrated(calibrated(file), 0.0)
     daemon.place[0] += 0.3
-    with pytest.raises(BadInputError, match=r"\d+ mm from home; allowed for the first pose"):
+    with pytest.raises(BadInputError, match=r"\d+ mm from home, where the first pose must be"):
         checked_running(out, file, daemon, None, 1, folder)  # type: ignore[arg-type]
     daemon.state = "ready"
     with pytest.raises(

@@ -155,7 +155,7 @@ def test_commission_rejects_a_folder_with_other_files(tmp_path: Path) -> None:
         (("poses", "planar-3", "--png", "a.pdf"), "--png a.pdf: allowed: a name that ends in .png"),
         (("markers", "print", "0", "--out", "a.png"), "--out a.png: allowed: a name that ends in"),
         (("doctor", "--report", "/nowhere/a"), "allowed: a file in an existing folder"),
-        (("markers", "map", "/nowhere"), "/nowhere: allowed: a folder with images"),
+        (("markers", "map", "/nowhere"), "/nowhere: is not a folder with images"),
         (("profiles", "show", "nothing-of-the-kind"), "cdpr profiles list"),
         *(
             (("run", "planar-3", *OWN, "--live-origin", typed), "allowed: the origin of a web page")

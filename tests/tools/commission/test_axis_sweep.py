@@ -70,5 +70,5 @@ def test_a_recording_without_all_moves_is_rejected(tmp_path: Path) -> None:
     rows["cycle"], rows["time_s"] = np.arange(100), np.arange(100) * 2e-3
     rows["program"] = PROGRAMS.index("sweep")
     rows["setpoint_velocity_rad_s"][10:40, axis.place] = 1.0
-    with pytest.raises(WorkFailedError, match="1 legs of a sweep and 0 fast turns"):
+    with pytest.raises(WorkFailedError, match="1 of 2 sweep legs and 0 of"):
         write_passes(rows, axis, Paths(tmp_path))

@@ -129,7 +129,7 @@ def test_a_relative_motion_is_sent_as_distance_and_turn() -> None:
         (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: 2, X Y in mm"),
         (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: 3, X Y Z in mm"),
         (NAMED, {"to": "lod"}, "--to lod: 'lod' is not a number; allowed: X Y in mm, or load"),
-        (NAMED, {"to": "load", "relative": True}, "--to load: a pose; allowed: without --relative"),
+        (NAMED, {"to": "load", "relative": True}, "--to load: is a pose, not a distance; omit"),
         (NAMED, {"to": "home"}, "--to home: home is on the stand, .*; `cdpr lower` puts"),
         (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),
         (PLANE, {"rotate": "5"}, "--rotate 5: this platform has no controlled angle"),

@@ -342,7 +342,7 @@ def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None
         ("exit_1_m", "1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
         ("frame_m", "3x2", "value '3x2'; allowed: two numbers in m, such as `4, 3`"),
         ("frame_m", "3000, 2000", "allowed: up to 300 m each (in metres, not millimetres)"),
-        ("name", "two\nlines", "allowed: a text of one line"),
+        ("name", "two\nlines", "allowed: one line of text"),
     ],
 )
 def test_invalid_answers_by_set_are_rejected(
