@@ -155,6 +155,15 @@ def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterat
     left = [i for i in (3, 4, 5) if i not in model.kinematics.directions]
     if platform.is_planar or not left or is_point(platform):
         return
+    below_m = platform.home_m[2] - platform.workspace_min_m[2]
+    if model.kinematics.hangs_freely and below_m > 0.0:
+        text = (
+            f"the box reaches {below_m:.3g} m below home, where the control takes the platform as "
+            "standing and ignores its tilt; allowed: z from "
+            f"{platform.home_m[2]:.3g} upward, or a lower home"
+        )
+        yield Finding("platform.workspace_min_m", text, impossible=True)
+        return
     names = ", ".join(DIRECTIONS[3][i] for i in left)
     places, poses = _targets(statics)
     weight = np.tile(model.workspace(0.0, 0.0).wrenches[0], (len(poses), 1))

@@ -199,6 +199,12 @@ class CoggingProfile(_Part):
         self.require_true_of(bounds)
         for key, mine in self.identity.model_dump().items():
             other = getattr(identity, key)
+            if other != mine and key == "serial" and mine == IMPORTED_SERIAL:
+                raise CoggingProfileError(
+                    "identity.serial: is 0, because the cogging profile comes from an imported "
+                    f"recording, but this axis has {other}: if the recording is of this motor, "
+                    f"write {other} into the profile; else commission the motor"
+                )
             if other != mine:
                 raise CoggingProfileError(
                     f"the cogging profile is for a drive with {key} = {mine}, but this axis has "
@@ -207,6 +213,8 @@ class CoggingProfile(_Part):
         return (self.thesis if method == "thesis" else self.harmonic).compensation(bounds)
 
 
+IMPORTED_SERIAL = 0
+"""Serial number of the drive in a profile from an imported recording, which does not have it."""
 TABLE_SAMPLES = 4096
 OBSERVER_s = 0.003
 

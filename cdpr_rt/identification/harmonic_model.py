@@ -11,6 +11,7 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.identification import windows as design
+from cdpr_rt.identification.remainder import remaining_curve
 from cdpr_rt.identification.result import ConfidenceInterval, Harmonic, HarmonicResult, likely_cause
 from cdpr_rt.identification.windows import (
     STARTS,
@@ -714,6 +715,12 @@ def _result(
         excluded_fraction=lost / rows,
         residual_rms_Nm=rms(fitted.residual_Nm),
         error_by_orders_Nm=choice.error_Nm,
+        remainder_Nm=remaining_curve(
+            windows,
+            [np.flatnonzero(kind >= 0) for kind in design.kinds(windows)],
+            fitted.residual_Nm,
+            fitted.lag_rad,
+        ),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import FrictionFeedforward
+from cdpr_rt.identification.remainder import at_angle
 from cdpr_rt.identification.windows import TWO_PI, FrictionShape
 
 # An identified value with its confidence interval.
@@ -69,6 +70,8 @@ class HarmonicResult:
     residual_rms_Nm: float
     error_by_orders_Nm: FloatArray
     """Residual (rms) with the 0, 1, 2, ... most significant orders, (k + 1,)."""
+    remainder_Nm: FloatArray
+    """Cogging that the orders leave, as samples over the turn; see `remaining_curve`."""
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -82,7 +85,7 @@ class HarmonicResult:
 
     def cogging_Nm(self, angle_rad: FloatArray) -> FloatArray:
         """Return the torque that holds the rotor against the cogging, without lag."""
-        out = np.zeros_like(np.asarray(angle_rad, float))
+        out = at_angle(self.remainder_Nm, angle_rad)
         for h in self.harmonics:
             out += h.cosine_Nm * np.cos(h.order * angle_rad)
             out += h.sine_Nm * np.sin(h.order * angle_rad)

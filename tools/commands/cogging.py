@@ -173,6 +173,7 @@ def compare_runs(
     used = comparison.runs_of(folder)
     curves = comparison.tables(profile, [run for run in used if run.path.stem[:3] != "map"])
     rows, results = [["recording", *comparison.CURVES]], []
+    others = [other for other in others if other.resolve() != folder.resolve()]
     for run in [*used, *(run for other in others for run in comparison.runs_of(other))]:
         by_method = {
             name: comparison.explained(curves[name][run.direction], run)

@@ -7,16 +7,19 @@ from typing import Annotated
 
 import typer
 
-from cdpr_profiles import load_robot, load_winch
+from cdpr_profiles import Winch, load_robot, load_winch, load_winch_or_robot
+from cdpr_profiles.robot import robot_of_winch
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
     RobotArgument,
+    RobotOrWinchArgument,
     WinchArgument,
 )
 from cdpr_tools.commission.run import prepare
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
+from cdpr_tools.report.save import require_free
 
 app = typer.Typer(
     name="import",
@@ -36,6 +39,10 @@ FilesArgument = Annotated[
 ]
 MapOption = Annotated[
     Path, typer.Option("--map", help="Which column is what, TOML.", metavar="FILE")
+]
+PosesOption = Annotated[
+    Path | None,
+    typer.Option("--poses", help="File with the poses, if it is another one.", metavar="FILE"),
 ]
 
 
@@ -85,10 +92,7 @@ def calibration(
     cables: Annotated[Path, typer.Argument(help="File with the cable lengths.", metavar="FILE")],
     mapping: MapOption,
     out_dir: Annotated[Path, typer.Option("--out", help="Folder for data.json.", metavar="DIR")],
-    poses: Annotated[
-        Path | None,
-        typer.Option(help="File with the poses, if it is another one.", metavar="FILE"),
-    ] = None,
+    poses: PosesOption = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -112,3 +116,34 @@ def calibration(
     data.save(path)
     out.say(f"written: {path}, {len(data.poses)} poses")
     out.result({"ok": True, "data": str(path), "poses": len(data.poses), "notes": notes})
+
+
+@app.command()
+def log(
+    machine: RobotOrWinchArgument,
+    file: Annotated[Path, typer.Argument(help="CSV, candump or MCAP file.", metavar="FILE")],
+    mapping: MapOption,
+    target: Annotated[
+        Path, typer.Option("--out", help="Recording to write; a name ending in .mcap.")
+    ],
+    poses: PosesOption = None,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Convert a recording for `cdpr log info`, `cdpr log plot` and `cdpr log export`.
+
+    It may hold angles, speeds, torques, lengths, tensions and poses. Missing quantities stay empty.
+    """
+    from cdpr_tools.imports.recording import import_recording, write_recording  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    if target.suffix != ".mcap":
+        raise BadInputError(f"--out {target}: allowed: a name that ends in .mcap")
+    require_free("--out", target, overwrite)
+    profile = load_winch_or_robot(machine)
+    robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
+    imported, known = import_recording(file, poses or file, mapping, robot)
+    write_recording(imported, robot, target)
+    count, last_s = imported.rows.size, float(imported.rows["time_s"][-1])
+    out.say(f"written: {target}, {count} rows in {last_s:.2f} s with {', '.join(known) or 'time'}")
+    out.result({"ok": True, "out": target, "rows": count, "seconds": last_s, "fields": known})

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.geometry_calibration import geometry_sha256
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.calibration.readings import CalibrationData, PoseReading
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_tools.errors import BadInputError
@@ -35,12 +35,27 @@ _FEWEST: Final = 3
 
 
 @dataclass(frozen=True)
-class _Poses:
+class Poses:
     """Measured poses over time, in the room: positions (k, 3), rotations of length k or None."""
 
     time_s: FloatArray
     position_m: FloatArray
     rotation: Rotation | None
+
+    def known_at(self, time: FloatArray) -> BoolArray:
+        """Return whether these times, (m,), lie between two poses without a gap."""
+        after = np.clip(np.searchsorted(self.time_s, time), 1, self.time_s.size - 1)
+        first, second = self.time_s[after - 1], self.time_s[after]
+        return np.asarray((time >= first) & (time <= second) & (second - first <= _GAP_S))
+
+    def position_at(self, time: FloatArray) -> FloatArray:
+        """Return interpolated positions, (m, 3)."""
+        return np.column_stack([np.interp(time, self.time_s, one) for one in self.position_m.T])
+
+    def turned_at(self, time: FloatArray) -> Rotation:
+        """Return interpolated rotations of length m; the file must have rotations."""
+        assert self.rotation is not None
+        return Slerp(self.time_s, self.rotation)(time)
 
 
 def import_calibration(
@@ -54,9 +69,9 @@ def import_calibration(
     mapping = CalibrationMapping.load_file(mapping_path)
     model = platform_model_of(robot)
     table = read_any(cables)
-    measured = _read_poses(table if poses == cables else read_any(poses), mapping.pose)
+    measured = read_poses(table if poses == cables else read_any(poses), mapping.pose)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
-    row = _rows(time, measured.time_s, mapping)
+    row = _rows(time, measured, mapping)
     if row.size < _FEWEST:
         raise BadInputError(
             f"{cables}: {row.size} rows lie within the time of the poses, {measured.time_s[0]:.2f} "
@@ -64,12 +79,10 @@ def import_calibration(
             "check the unit of the times, and correct the difference of the clocks by `offset`"
         )
     at = time[row]
-    position = np.column_stack(
-        [np.interp(at, measured.time_s, values) for values in measured.position_m.T]
-    )
+    position = measured.position_at(at)
     turned = None
     if measured.rotation is not None:
-        turned = Slerp(measured.time_s, measured.rotation)(at)
+        turned = measured.turned_at(at)
         turned = turned * turned[0].inv() * Rotation.from_matrix(model.home_pose.Q)
     _require_home(poses, position[0], model)
     readings = [
@@ -134,7 +147,7 @@ def _read_cables(
     return time, lengths, np.column_stack([c.read_all(table, FORCES) for c in columns.tensions])
 
 
-def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
+def read_poses(table: Table, columns: PoseColumns) -> Poses:
     """Return the poses in the room; skip rows with an empty cell, where the body was hidden."""
     time = read_time(columns.time, table)
     to_room = _to_room(table, columns)
@@ -156,7 +169,7 @@ def _read_poses(table: Table, columns: PoseColumns) -> _Poses:
         basis, told = Rotation.from_matrix(to_room), turns[seen]
         of_body = Rotation.from_quat(told) if by_quaternion else Rotation.from_rotvec(told)
         rotation = basis * of_body * basis.inv()
-    return _Poses(time[seen], position[seen] @ to_room.T + columns.offset_m, rotation)
+    return Poses(time[seen], position[seen] @ to_room.T + columns.offset_m, rotation)
 
 
 def _to_room(table: Table, columns: PoseColumns) -> FloatArray:
@@ -174,12 +187,9 @@ def _to_room(table: Table, columns: PoseColumns) -> FloatArray:
     return matrix
 
 
-def _rows(time: FloatArray, poses_s: FloatArray, mapping: CalibrationMapping) -> FloatArray:
+def _rows(time: FloatArray, measured: Poses, mapping: CalibrationMapping) -> FloatArray:
     """Return the rows of the cables that lie between two poses, thinned to the highest rate."""
-    after = np.clip(np.searchsorted(poses_s, time), 1, poses_s.size - 1)
-    inside = (time >= poses_s[after - 1]) & (time <= poses_s[after])
-    inside &= poses_s[after] - poses_s[after - 1] <= _GAP_S
-    inside &= (time >= mapping.from_s) & (time <= mapping.until_s)
+    inside = measured.known_at(time) & (time >= mapping.from_s) & (time <= mapping.until_s)
     kept, last = [], -np.inf
     for i in np.flatnonzero(inside):
         if time[i] - last >= (1.0 - 1e-3) / mapping.rate_Hz:

@@ -16,32 +16,35 @@ from cdpr_drivers.decode.decoder import Decoder, KnownNode
 from cdpr_profiles import Winch
 from cdpr_profiles.bounded_input import read_bytes
 from cdpr_profiles.errors import ProfileError
-from cdpr_tools.imports.tables import TIME, Table, read_table
+from cdpr_tools.imports.tables import MOST_BYTES, TIME, Table, read_table
 
-_MOST_BYTES: Final = 1 << 30
 _MCAP: Final = b"\x89MCAP0\r\n"
 _CANDUMP: Final = re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#")
 _POSITION: Final = 0x6064
 _DEEPEST: Final = 8
 
 
-def read_any(path: Path, winch: Winch | None = None) -> Table:
-    """Read a table, an MCAP file, or with a winch a candump log; raises ProfileError."""
-    data = read_bytes(path, _MOST_BYTES)
+def read_any(path: Path, winches: Mapping[str, Winch] | None = None) -> Table:
+    """Read a table, an MCAP file, or with winches a candump log; raises ProfileError.
+
+    `winches` has the prefix of each winch's columns as key, such as "left.".
+    """
+    data = read_bytes(path, MOST_BYTES)
     if data.startswith(_MCAP):
         return _read_mcap(path, data)
-    if winch is not None and _CANDUMP.match(data):
-        return _read_candump(path, data, winch)
+    if winches is not None and _CANDUMP.match(data):
+        return _read_candump(path, data, winches)
     return read_table(path)
 
 
-def _read_candump(path: Path, data: bytes, winch: Winch) -> Table:
-    """Return the values that the drive sent: a row for each position, columns such as "6077".
+def _read_candump(path: Path, data: bytes, winches: Mapping[str, Winch]) -> Table:
+    """Return the values in PDOs: a row for each position of a drive, columns such as "6077".
 
-    The drive's profile has the PDO map, unless the log contains its configuration. Values are in
-    the units that `units` states. The time of a row is that of the SYNC before it.
+    The drives' profiles have the PDO maps, unless the log contains their configuration. Values are
+    in the units that `units` states. The time of a row is that of the SYNC before it.
     """
-    decoder = Decoder({winch.node_id: KnownNode.of_winch(winch)})
+    nodes = {winch.node_id: (prefix, winch) for prefix, winch in winches.items()}
+    decoder = Decoder({node: KnownNode.of_winch(winch) for node, (_, winch) in nodes.items()})
     rows: list[dict[str, float]] = []
     units = {TIME: "s"}
     sync_s: float | None = None
@@ -49,23 +52,26 @@ def _read_candump(path: Path, data: bytes, winch: Winch) -> Table:
     for _, frame in read_log(str(path), data.decode("ascii", "replace").splitlines(keepends=True)):
         record = decoder.decode(frame)
         sync_s = frame.time_s if record.kind == "SYNC" else sync_s
-        if record.node_id != winch.node_id or not record.kind.startswith("TPDO"):
+        if record.node_id not in nodes or not record.kind.startswith(("TPDO", "RPDO")):
             continue
+        prefix, _ = nodes[record.node_id]
         for value in record.fields:
             if isinstance(value.value, str):
                 continue
-            if value.index == _POSITION and "6064" in row:
+            name = f"{prefix}{value.index:04X}"
+            if value.index == _POSITION and name in row:
                 rows.append(row)
                 row = {}
             row.setdefault(TIME, frame.time_s if sync_s is None else sync_s)
-            row[f"{value.index:04X}"] = float(value.value)
-            units[f"{value.index:04X}"] = value.unit
+            row[name] = float(value.value)
+            units[name] = value.unit
     if not rows:
+        ids = ", ".join(str(node) for node in nodes)
         raise ProfileError(
             path,
             "",
-            f"no positions (6064h) of node {winch.node_id}, the node_id of {winch.reference}; "
-            "check node_id and the PDO map of the drive's profile",
+            f"no positions (6064h) of node {ids}; check node_id and the PDO map of the drive's "
+            "profile",
         )
     return _joined(path, data, rows, units)
 

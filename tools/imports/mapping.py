@@ -86,8 +86,11 @@ class MotorMapping(Profile):
     """Mapping of a motor's recording."""
 
     columns: MotorColumns
-    torque_lag_s: Annotated[float, Field(ge=0.0, le=2.0)] | Literal["fit"] = 0.0
-    """Time constant of the low-pass filter in the drive's reading of torque or current."""
+    torque_lag_s: Annotated[float, Field(ge=0.0, le=2.0)] | Literal["fit"] | None = None
+    """Time constant of the low-pass filter in the drive's reading of torque or current.
+
+    By default none is removed, but the recording is searched for one.
+    """
     from_s: float = -math.inf
     until_s: float = math.inf
 
@@ -105,6 +108,12 @@ def motor_units(winch: Winch) -> tuple[dict[str, float], dict[str, float]]:
         "permille": 1e-3 * motor.rated_torque_Nm,
     }
     return angles, torques
+
+
+def speed_units(winch: Winch) -> dict[str, float]:
+    """Return the units of speed of a motor."""
+    angles, _ = motor_units(winch)
+    return {**{f"{name}/s": value for name, value in angles.items()}, "rpm": math.tau / 60.0}
 
 
 class CableColumns(Profile):
@@ -144,3 +153,40 @@ class CalibrationMapping(Profile):
     until_s: float = math.inf
     rate_Hz: Annotated[float, Field(gt=0.0, le=1e4)] = 100.0
     """Highest rate at which readings are used."""
+
+
+class AxisColumns(Profile):
+    """Columns of the axes for a recording: of each kind none, or one for every axis."""
+
+    time: Column
+    angles: tuple[Column, ...] = ()
+    angle_setpoints: tuple[Column, ...] = ()
+    speeds: tuple[Column, ...] = ()
+    torques: tuple[Column, ...] = ()
+    """Torque or current that the drive reports."""
+    torque_setpoints: tuple[Column, ...] = ()
+    lengths: tuple[Column, ...] = ()
+    tensions: tuple[Column, ...] = ()
+
+
+class RecordingMapping(Profile):
+    """Mapping of a recording of a whole machine; mappings of the other imports are valid too."""
+
+    cables: AxisColumns | None = None
+    columns: MotorColumns | None = None
+    """Of a single motor, in place of `cables`."""
+    pose: PoseColumns | None = None
+    target: PoseColumns | None = None
+    """Set-point of the pose, in the file of the cables."""
+    from_s: float = -math.inf
+    until_s: float = math.inf
+    rate_Hz: float = math.inf
+    torque_lag_s: float | str | None = None
+    """Ignored, as is `rate_Hz`: a recording keeps the values as they are."""
+
+    def axis_columns(self) -> AxisColumns | None:
+        """Return the columns of the axes; those of a motor as columns of its one axis."""
+        motor = self.columns
+        if motor is None or motor.time is None:
+            return self.cables
+        return AxisColumns(time=motor.time, angles=(motor.angle,), torques=(motor.torque,))

@@ -14,6 +14,7 @@ import numpy as np
 from cdpr_profiles import Winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.identification.cogging_profile import IMPORTED_SERIAL
 from cdpr_rt.identification.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
 from cdpr_rt.identification.torque_lag import (
     MOST_RESIDUAL,
@@ -75,7 +76,9 @@ def import_motor(files: Sequence[Path], mapping_path: Path, winch: Winch, paths:
     if mapping.columns.time is None:
         return _import_maps(files, mapping_path, mapping, winch, paths)
     pieces = [
-        piece for path in files for piece in _pieces(read_any(path, winch), mapping, winch, notes)
+        piece
+        for path in files
+        for piece in _pieces(read_any(path, {"": winch}), mapping, winch, notes)
     ]
     if not pieces:
         raise BadInputError(
@@ -202,6 +205,8 @@ def _lag(
 ) -> float:
     """Return the time constant to remove; add a note about a filter that the recording shows."""
     given = mapping.torque_lag_s
+    if isinstance(given, float):
+        return given
     fitted = fit_torque_lag(readings, period_s)
     lag = fitted.lag_s
     shown = f"{lag.value:.3g} ± {lag.half_width:.2g} s"
@@ -214,14 +219,13 @@ def _lag(
     if given == "fit":
         notes.append(f"the torque reading is low-passed with a time constant of {shown}")
         return lag.value
-    off = abs(lag.value - given) > max(3.0 * lag.half_width, 0.3 * given)
-    if fitted.reliable and fitted.gain < _LATE and off:
+    if fitted.reliable and fitted.gain < _LATE and lag.value > 3.0 * lag.half_width:
         notes.append(
-            f"the torque reading seems to be low-passed with {shown}, but torque_lag_s is "
-            f"{given:g}: amplitudes of high orders come out wrong; check the drive's filter, or "
-            'write torque_lag_s = "fit"'
+            f"the torque reading seems to be low-passed with {shown}, and amplitudes of high "
+            'orders come out too small: write torque_lag_s = "fit", or the time constant of the '
+            "drive's filter, 0 for none"
         )
-    return given
+    return 0.0
 
 
 def _near_samples(grid: FloatArray, time: FloatArray) -> FloatArray:
@@ -241,7 +245,7 @@ def _meta(
             "vendor_id": drive.vendor_id,
             "product_code": drive.product_code,
             "revision": drive.revision,
-            "serial": 0,
+            "serial": IMPORTED_SERIAL,
             "encoder_counts_per_turn": winch.encoder_counts_per_turn,
         },
         "latency_s": 0.0,
@@ -298,7 +302,7 @@ def _import_maps(
     angles, torques = motor_units(winch)
     written, passes = [], []
     for k, path in enumerate(files):
-        table = read_any(path, winch)
+        table = read_any(path, {"": winch})
         angle = mapping.columns.angle.read_all(table, angles)
         torque = mapping.columns.torque.read_all(table, torques)
         count = angle.size

@@ -30,9 +30,9 @@ from cdpr_tools.report.style import (
 )
 
 FIELDS = (
-    "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N",
-    "lateness_s", "exchange_s", "compute_s", "state", "pose", "pose_setpoint",
-    "program", "reaction", "stamp_ns",
+    "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "torque_actual_Nm",
+    "tension_N", "cable_length_m", "lateness_s", "exchange_s", "compute_s", "state", "pose",
+    "pose_setpoint", "program", "reaction", "stamp_ns",
 )  # fmt: skip
 _TENSION = "tension (N)"
 _STRIP_in, _PANEL_in, _NARROW_in, _WIDE_in = 0.25, 1.7, 7.4, 12.0
@@ -47,6 +47,11 @@ _SEEN_ns: Final = 200_000_000
 _MOVED = 1e-6
 """A coordinate that varies by less (m or rad) over a recording is not one that the robot moves."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
+_IN_PLACE: Final = (
+    ("position_rad", "cable length (m)", "cable_length_m"),
+    ("torque_sent_Nm", "torque (Nm)", "torque_actual_Nm"),
+)
+"""Field that is unknown, and label and name of the field to draw in its place."""
 _POWERLESS, _REACTING, _FAULT = range(1, 4)
 _GAP_S, _NOT_RECORDED = 0.5, "not recorded"
 """Rows further apart in time than this are not joined by a line."""
@@ -86,10 +91,15 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
         (_TENSION, columns["tension_N"]),
     ]
     panels = [one for one in panels if np.isfinite(one[1][:, chosen]).any()]
+    for first, label, name in _IN_PLACE:  # recordings of other programs
+        if not np.isfinite(columns[first]).any() and np.isfinite(columns[name][:, chosen]).any():
+            panels.append((label, columns[name]))
     poses = pose_curves(columns)
     dot = "." if columns[ELAPSED].size == 1 else None
     beside = bool(poses and panels)
-    grid = _Grid.of(len(panels), len(poses) + 1) if beside else _Grid.of(len(panels) + 1, 0)
+    timed = int(any(np.isfinite(columns[name]).any() for name in _TIMES.values()))
+    below = len(poses) + timed
+    grid = _Grid.of(len(panels), below) if beside else _Grid.of(max(len(panels) + below, 1), 0)
     for ax, (label, values) in zip(grid.timed, panels, strict=False):
         for k in chosen:
             colour, line = SERIES[k % len(SERIES)], "-" if k < len(SERIES) else "--"
@@ -103,7 +113,8 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
         _draw_pose(ax, columns[ELAPSED], curves, dot)
     if grid.path is not None:
         _draw_path(grid.path, columns)
-    _draw_times(grid.timed[-1], columns)
+    if timed:
+        _draw_times(grid.timed[-1], columns)
     _draw_what_happened(grid, selection, columns)
     if panels:
         legend_above(grid.figure, grid.timed[0], columns=10 if beside else 4)
@@ -262,6 +273,8 @@ def _draw_path(ax: Axes, columns: Columns) -> None:
     upward = 1 if _flat(pose[:, 2]) else 2
     step = max(1, len(pose) // _PATH_POINTS)
     for values, style, label in ((pose, "-", "platform"), (setpoint, "--", "target")):
+        if not np.isfinite(values).any():
+            continue
         colour, shown = SERIES[style == "--"], label
         for a, b in recorded_stretches(columns[ELAPSED]):
             known = 1e3 * values[a:b:step]
@@ -308,7 +321,7 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
         },
     }
     found = {label: curves for label, curves in panels.items() if curves}
-    if panels["platform (m)"]:
+    if panels["platform (m)"] and np.isfinite(poses[1]).any():
         off = np.linalg.norm(poses[0][:, :3] - poses[1][:, :3], axis=1)
         found["distance from set-point (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
     return found

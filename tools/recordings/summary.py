@@ -144,7 +144,9 @@ class _Count:
             passed = float(spent[state == value].sum())
             self.states_s[label] = self.states_s.get(label, 0.0) + passed
         for name in ("lateness_s", "exchange_s", "compute_s"):
-            self.longest[name] = max(self.longest.get(name, 0.0), float(rows[name].max()))
+            self.longest[name] = float(
+                np.fmax.reduce(rows[name], initial=self.longest.get(name, math.nan))
+            )
         self.last = {name: int(rows[name][-1]) for name in ("cycle", "missed", "late_cycles")}
         self.last_s, self.last_state = float(rows[ELAPSED][-1]), int(rows["state"][-1])
         self.rows += rows["cycle"].size
@@ -284,7 +286,10 @@ def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
             where += f", {off_mm:.1f} mm from its set-point"
     else:
         angles = np.degrees(np.array(run["position_rad"], float))
-        where = ", ".join(f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False)) + " deg"
+        known = [
+            f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False) if not np.isnan(x)
+        ]
+        where = f"{', '.join(known)} deg" if known else "positions unknown"
     time = f"{run['from_s']:10.3f} s to {run['until_s']:9.3f} s"
     why = f"failed: {run['failed_by']}; then" if "failed_by" in run else "ended,"
     if "cut_short_by" in run:
@@ -354,8 +359,9 @@ def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
                 ("answers after", "exchange_s"),
                 ("computing", "compute_s"),
             )
+            if not math.isnan(figures[f"longest_{name}"])
         ]
-        lines.append(f"  at most: {', '.join(longest)}")
+        lines += [f"  at most: {', '.join(longest)}"] if longest else []
     if figures["ended_while_active"]:
         lines.append(f"  {WHILE_ACTIVE}: {figures['ended_while_active']}")
     runs = [run for run in figures["runs"] if run["program"] not in ("hold", "idle")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,12 @@ def test_noise_and_time_offset_are_estimated_without_inventing_faults(
     assert noise.offset_std_s < 0.001
     assert noise.geometry.knowledge.alike > 1.5
     assert outcome.good and outcome.told_from_file
+    file_mm = outcome.before.mean_mm
+    for share, objections in ((2.9, 0), (3.1, 1)):  # 3 sigma is no worse than with the file
+        predicted = replace(outcome.predicted, position_mm=share * file_mm)
+        against = replace(outcome, predicted=predicted).objections()
+        assert len(against) == objections, against
+        assert all(f"allowed: {3.0 * file_mm:.1f} mm" in text for text in against)
     said = "\n".join(outcome.verdict())
     assert "time offset: measured points are +" in said
     assert "noise of the lengths by the data: 1." in said

@@ -169,3 +169,15 @@ def test_loads_beside_a_rod_or_below_a_knot_are_reported_as_swinging_but_accepte
         found = rotation_finding(tmp_path, text)
         assert found is not None and not found.impossible
         assert "the platform swings about these axes" in found.text
+
+
+def test_a_box_below_the_home_of_a_hanging_platform_is_impossible(tmp_path: Path) -> None:
+    text = hanging(0.05, 0.1)
+    low = re.search(r"workspace_min_m = \[.*, (.*)\]", text)
+    home = re.search(r"home_m = \[.*, (.*)\]", text)
+    assert low is not None and home is not None
+    under = f"{low[0][: -len(low[1]) - 1]}{float(home[1]) - 0.1}]"
+    path = tmp_path / "hanging.toml"
+    path.write_text(text.replace(low[0], under))
+    found = [one for one in diagnose(load_robot(path)) if "0.1 m below home" in one.text]
+    assert [(one.key, one.impossible) for one in found] == [("platform.workspace_min_m", True)]

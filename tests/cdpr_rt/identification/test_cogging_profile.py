@@ -10,6 +10,7 @@ import pytest
 from cdpr_profiles import load_motor
 from cdpr_profiles.motor_bounds import MotorBounds
 from cdpr_rt.identification.cogging_profile import (
+    IMPORTED_SERIAL,
     CoggingProfile,
     CoggingProfileError,
     DriveIdentity,
@@ -204,3 +205,11 @@ def test_an_invalid_time_is_rejected(tmp_path, key, value):
     )
     with pytest.raises(CoggingProfileError, match=r"p\.json"):
         CoggingProfile.load(path)
+
+
+def test_a_profile_of_an_imported_recording_says_how_to_name_its_drive() -> None:
+    imported = profile().model_copy(
+        update={"identity": IDENTITY.model_copy(update={"serial": IMPORTED_SERIAL})}
+    )
+    with pytest.raises(CoggingProfileError, match=r"imported recording.*write 4 into the profile"):
+        imported.compensation("harmonic", IDENTITY, BOUNDS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,26 @@ def test_one_turn_in_one_direction_shows_all_orders(speed):
         assert one.amplitude_Nm.value == pytest.approx(amplitude, rel=0.25, abs=3e-3)
     same = found.coulomb_forward_Nm.value == found.coulomb_backward_Nm.value
     assert same and found.coulomb_forward_Nm.value > 0.0
+
+
+@pytest.mark.parametrize("turns", [1.03, 2.03])
+def test_a_curve_adds_what_many_small_orders_leave(turns: float) -> None:
+    rng = np.random.default_rng(5)
+    small = [(n, 1.2e-3 * rng.rayleigh(), rng.uniform(0.0, 360.0)) for n in range(1, 90)]
+    terms = ((7, 0.02, 10.0), (28, 0.012, 30.0), *small)
+    plant = TruePlant(terms=terms, coulomb=0.02, breakaway=0.025, kt_error=0.0)
+    found = identified(turn(plant, 20.0, turns))
+    angle = np.linspace(0.0, 2.0 * np.pi, 4000)
+    true = plant.wave(terms, angle)
+    alone = replace(found, remainder_Nm=np.zeros_like(found.remainder_Nm))
+    error, before = (np.std(f.cogging_Nm(angle) - true) for f in (found, alone))
+    assert error < 0.85 * before
+
+
+def test_noise_that_does_not_repeat_adds_no_curve() -> None:
+    plant = TruePlant(coulomb=0.08, breakaway=0.085, noise=2.0, kt_error=0.0)
+    found = identified(*(turn(plant, speed, 3.03) for speed in (20.0, -20.0)))
+    assert np.std(found.remainder_Nm) < 0.5 * found.residual_rms_Nm
 
 
 def test_a_motor_without_cogging_that_turns_in_one_direction_has_no_orders():

@@ -135,6 +135,7 @@ def harmonic_result() -> HarmonicResult:
         excluded_fraction=0.01,
         residual_rms_Nm=1.5e-3,
         error_by_orders_Nm=np.array([0.04, 0.015, 0.0015, 0.0016]),
+        remainder_Nm=np.zeros(4),
     )
 
 

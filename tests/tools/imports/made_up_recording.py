@@ -64,5 +64,6 @@ def mapping(folder: Path, *, lag: str = "0.1", sign: int = 1, **changes: str) ->
         **changes,
     }
     path = folder / "map.toml"
-    path.write_text(f"torque_lag_s = {lag}\n[columns]\n" + "\n".join(columns.values()) + "\n")
+    first = f"torque_lag_s = {lag}\n" if lag else ""
+    path.write_text(first + "[columns]\n" + "\n".join(columns.values()) + "\n")
     return path

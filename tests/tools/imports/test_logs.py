@@ -27,7 +27,7 @@ def test_a_candump_log_gives_position_and_torque_at_each_sync(tmp_path: Path) ->
         ]
     path = tmp_path / "bus.log"
     path.write_text("\n".join(lines) + "\n")
-    table = read_any(path, WINCH)
+    table = read_any(path, {"": WINCH})
     turn = 360.0 * 1024 / WINCH.encoder_counts_per_turn
     assert table.column("6064") == pytest.approx([0.0, turn, 2 * turn])
     assert table.column("6077") == pytest.approx([0.0, 0.3, 0.6])
@@ -39,7 +39,7 @@ def test_a_log_without_the_winch_names_its_node(tmp_path: Path) -> None:
     path = tmp_path / "bus.log"
     path.write_text("(1700000000.000000) can0 701#05\n")
     with pytest.raises(ProfileError, match=rf"no positions \(6064h\) of node {WINCH.node_id}"):
-        read_any(path, WINCH)
+        read_any(path, {"": WINCH})
 
 
 def test_json_messages_of_an_mcap_file_become_columns(tmp_path: Path) -> None:
