@@ -65,8 +65,8 @@ def import_recording(
 ) -> tuple[ImportedRows, list[str]]:
     """Return the rows of recorded files, and the names of the quantities in them.
 
-    A quantity that is not recorded stays unknown. Rows have the times of the axes' columns, or if
-    there are none, those of the poses. Raises ProfileError and BadInputError.
+    A quantity that is not recorded stays unknown. Rows have the times of the axes' columns, or of
+    the poses without such columns. Raises ProfileError and BadInputError.
     """
     mapping = RecordingMapping.load_file(mapping_path)
     columns = mapping.axis_columns()
