@@ -32,6 +32,11 @@ from cdpr_tools.imports.tables import Table
 _GAP_S: Final = 0.05
 """Poses farther apart are not interpolated."""
 _FEWEST: Final = 3
+_CLOCK_STEP_S: Final = 0.02
+_ALIKE: Final = 0.8
+"""Least correlation of rates at which another difference of the clocks is suggested."""
+_BETTER: Final = 0.2
+"""Least increase of the correlation for that."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,7 @@ def import_calibration(
     table = read_any(cables)
     measured = read_poses(table if poses == cables else read_any(poses), mapping.pose)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
+    notes = _require_same_clock(mapping_path, time, lengths, measured, model)
     row = _rows(time, measured, mapping)
     if row.size < _FEWEST:
         raise BadInputError(
@@ -92,7 +98,7 @@ def import_calibration(
         )
         for i, j in enumerate(row)
     ]  # fmt: skip
-    notes = [f"{row.size} of {time.size} rows are used, at most {mapping.rate_Hz:g} a second"]
+    notes += [f"{row.size} of {time.size} rows are used, at most {mapping.rate_Hz:g} a second"]
     data = CalibrationData(
         robot=robot.profile,
         geometry_sha256=geometry_sha256(robot),
@@ -196,6 +202,53 @@ def _rows(time: FloatArray, measured: Poses, mapping: CalibrationMapping) -> Flo
             kept.append(i)
             last = time[i]
     return np.array(kept, int)
+
+
+def _require_same_clock(
+    path: Path, time: FloatArray, lengths: FloatArray, poses: Poses, model: PlatformModel
+) -> list[str]:
+    """Raise BadInputError if lengths and poses agree much better at another difference of clocks.
+
+    The rates of the lengths are compared with those of the distances to the exit points. Returns a
+    note if they do not agree at any difference.
+    """
+    from scipy.signal import correlate, correlation_lags  # noqa: PLC0415  # slow to load
+
+    exits = np.array(model.platform.exit_points_m)
+    k = exits.shape[1]
+    apart = np.linalg.norm(exits[None] - poses.position_m[:, None, :k], axis=2)
+    told, first = (_rates(*one) for one in ((time, lengths), (poses.time_s, apart)))
+    products = sum(correlate(a, b) for a, b in zip(told[0], first[0], strict=True))
+    both = [np.ones_like(told[0][0]), np.ones_like(first[0][0])]
+    of_told = correlate((told[0] ** 2).sum(axis=0), both[1])
+    of_poses = correlate(both[0], (first[0] ** 2).sum(axis=0))
+    enough = (of_told > 0.3 * of_told.max()) & (of_poses > 0.3 * of_poses.max())
+    alike = np.where(enough, products / np.sqrt(np.maximum(of_told * of_poses, 1e-12)), 0.0)
+    later_s = _CLOCK_STEP_S * correlation_lags(told[0].shape[1], first[0].shape[1])
+    later_s += told[1] - first[1]
+    now, best = int(np.abs(later_s).argmin()), int(alike.argmax())
+    if alike[best] > _ALIKE and alike[best] - alike[now] > _BETTER:
+        raise BadInputError(
+            f"{path}: pose.time: the clocks differ: rates of lengths and poses have a correlation "
+            f"of {alike[now]:.2f}, but {alike[best]:.2f} if the poses are {later_s[best]:+.2f} s "
+            f"later; add {later_s[best]:.2f} s to `offset`"
+        )
+    if alike[now] > _ALIKE - _BETTER:
+        return []
+    return [
+        f"rates of lengths and poses have a correlation of only {alike[now]:.2f}: check `axes`, "
+        "the order and signs of the lengths, and the exit points"
+    ]
+
+
+def _rates(time: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    """Return rates of values (m, n) at equal steps, (n, r), 0 in gaps; and the first time."""
+    grid = np.arange(time[0], time[-1], _CLOCK_STEP_S)
+    after = np.clip(np.searchsorted(time, grid), 1, time.size - 1)
+    gap = time[after] - time[after - 1] > _GAP_S
+    rates = np.array([np.gradient(np.interp(grid, time, one), _CLOCK_STEP_S) for one in values.T])
+    rates[:, gap] = 0.0
+    return rates, float(grid[0])
 
 
 def _target(model: PlatformModel, position_m: FloatArray) -> list[float]:

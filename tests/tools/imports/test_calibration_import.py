@@ -94,6 +94,17 @@ def test_a_recording_that_does_not_begin_at_home_names_the_home_to_write(tmp_pat
     assert "write home_m = [" in result.stderr
 
 
+def test_a_wrong_order_of_the_cables_is_noted(tmp_path: Path) -> None:
+    files = recorded(tmp_path)
+    swapped = MAP.replace('"l1"', '"l"').replace('"l2"', '"l1"').replace('"l"', '"l2"')
+    files[2].write_text(swapped)
+    result = run(tmp_path, files)
+    assert result.returncode == 0, result.stderr
+    assert "check `axes`, the order" in " ".join(
+        json.loads(result.stdout.splitlines()[-1])["notes"]
+    )
+
+
 def test_a_quaternion_of_zeros_counts_as_a_hidden_body(tmp_path: Path) -> None:
     time = np.arange(0.0, 2.0, 0.01)
     lengths = cable_lengths_m(np.tile(MODEL.home[:2], (time.size, 1)))
@@ -117,7 +128,8 @@ def test_a_quaternion_of_zeros_counts_as_a_hidden_body(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("-1.812", "100.0", "0 rows lie within the time of the poses"),
+        ("-1.812", "100.0", "s to `offset`"),
+        ("rate_Hz = 50", "from_s = 9.0", "0 rows lie within the time of the poses"),
         ('"z", "y", "-x"', '"z", "y", "x"', "a right-handed frame"),
         ('"z", "y", "-x"', '"z", "up", "x"', "pose.axes[1]: value 'up'; allowed: x, y, z"),
         (', { name = "l3", unit = "mm" }]', "]", "cables.lengths: 2 columns; allowed: 3"),
