@@ -717,7 +717,7 @@ def _result(
         error_by_orders_Nm=choice.error_Nm,
         remainder_Nm=remaining_curve(
             windows,
-            [np.flatnonzero(kind >= 0) for kind in design.kinds(windows)],
+            [np.asarray(np.flatnonzero(kind >= 0), np.intp) for kind in design.kinds(windows)],
             fitted.residual_Nm,
             fitted.lag_rad,
         ),

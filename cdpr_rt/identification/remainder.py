@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.identification.windows import TWO_PI, Windows
+from cdpr_rt.identification.windows import TWO_PI, IntArray, Windows
 
 SAMPLES = 1440
 """Samples of the curve over a turn."""
@@ -23,7 +23,7 @@ _LEAST_VARIANCE = 1e-16
 
 
 def remaining_curve(
-    windows: Sequence[Windows], used: Sequence[FloatArray], residual_Nm: FloatArray, lag_rad: float
+    windows: Sequence[Windows], used: Sequence[IntArray], residual_Nm: FloatArray, lag_rad: float
 ) -> FloatArray:
     """Return the mean residual over the turn, (SAMPLES,), times the share of it that repeats.
 
@@ -49,7 +49,7 @@ def remaining_curve(
 
 
 def _turns(
-    windows: Sequence[Windows], used: Sequence[FloatArray], residual_Nm: FloatArray, lag_rad: float
+    windows: Sequence[Windows], used: Sequence[IntArray], residual_Nm: FloatArray, lag_rad: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return smoothed sums of residuals and numbers of windows, (t, SAMPLES), and 1/σ² (t,)."""
     sums, counts, precision, first = [], [], [], 0
@@ -61,15 +61,17 @@ def _turns(
         place = np.floor(np.mod(angle / TWO_PI, 1.0) * SAMPLES).astype(int) % SAMPLES
         for one in np.unique(turn):
             mine = turn == one
-            sums.append(_smooth(np.bincount(place[mine], left[mine], SAMPLES)))
-            counts.append(_smooth(np.bincount(place[mine], minlength=SAMPLES).astype(float)))
+            sums.append(_smoothed_sum(place[mine], left[mine]))
+            counts.append(_smoothed_sum(place[mine], np.ones(place[mine].size)))
             precision.append(1.0 / max(float(np.mean(left[mine] ** 2)), _LEAST_VARIANCE))
     return np.array(sums), np.array(counts), np.array(precision)
 
 
-def _smooth(values: FloatArray) -> FloatArray:
+def _smoothed_sum(place: IntArray, values: FloatArray) -> FloatArray:
+    """Return the smoothed sums of the values at each sample, (SAMPLES,)."""
+    sums = np.bincount(place, values, SAMPLES).astype(float)
     # scipy.ndimage is loaded on use: its import takes long
-    return np.asarray(scipy.ndimage.gaussian_filter1d(values, _WIDTH, mode="wrap"))
+    return np.asarray(scipy.ndimage.gaussian_filter1d(sums, _WIDTH, mode="wrap"))
 
 
 def at_angle(curve_Nm: FloatArray, angle_rad: FloatArray) -> FloatArray:
