@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import random
 import signal
-import subprocess
 import threading
 import time
-from collections.abc import Callable
 from contextlib import ExitStack, closing
 
 import pytest
@@ -28,66 +26,7 @@ from tests.drivers.axis_rig import (
     open_network,
     start_simulator,
 )
-from tests.drivers.bus_log import BusLog, logged
 from tests.fault_texts import alarm
-
-NODES = [1, 2]
-Process = subprocess.Popen[bytes]
-
-
-def _session(bus: str, disturb: Callable[[], None]) -> tuple[BusLog, list[float]]:
-    """Boot, drive while tasks read objects, and stop. Return the frames and the measured values."""
-    measured: list[float] = []
-    with logged(bus) as log, open_network(bus, NODES) as network:
-        clock = network.clock
-        assert clock.lockstep
-        disturb()
-        rig = Rig(bus, network, DRIVE, NODES)
-        rig.enable()
-        tasks = [
-            clock.start(lambda node=node: [network.read_int(node, 0x6041) for _ in range(20)])
-            for node in NODES
-        ]
-        for k in range(300):
-            rig.group.command.torque_Nm[:] = 0.3 if k < 200 else 0.0
-            rig.cycle()
-            clock.run_tasks()
-            measured += rig.group.feedback.position_rad.tolist()
-            if k % 50 == 0:
-                disturb()
-        assert [len(task.result()) for task in tasks] == [20, 20]
-        assert rig.group.close() == ""
-        clock.sleep(0.35)
-        measured.append(clock.now_s)
-    return log, measured
-
-
-def test_a_repeated_run_gives_the_same_frames_although_processes_are_delayed() -> None:
-    seed = 4711
-    print(f"seed {seed}")
-    rng = random.Random(seed)
-    logs, figures = [], []
-    for held_up in (False, True):
-        simulator = start_simulator(len(NODES))
-
-        def disturb(process: Process = simulator.process, held_up: bool = held_up) -> None:
-            if not held_up:
-                return
-            time.sleep(0.1 * rng.random())  # the master is late
-            process.send_signal(signal.SIGSTOP)
-            # the simulator is late while the master continues
-            threading.Timer(0.7 * rng.random(), process.send_signal, [signal.SIGCONT]).start()
-
-        try:
-            log, measured = _session(simulator.bus, disturb)
-        finally:
-            simulator.process.send_signal(signal.SIGCONT)
-            simulator.stop()
-        logs.append([(frame.identifier, frame.data) for frame in log.frames])
-        figures.append(measured)
-    assert len(logs[0]) > 1500
-    assert logs[0] == logs[1]
-    assert figures[0] == figures[1]
 
 
 def test_timeout_of_a_silent_node_is_in_bus_time(bus: str) -> None:
