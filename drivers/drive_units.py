@@ -9,6 +9,8 @@ from cdpr_profiles import DriveProfile
 
 _OF_RATED = {"per_mille_of_rated": 1e-3, "percent_of_rated": 1e-2}
 _ABSOLUTE_Nm = {"mNm": 1e-3, "cNm": 1e-2}
+CURRENTS_Arms = {"mA_rms": 1e-3, "mA_peak": 1e-3 / math.sqrt(2.0)}
+"""Units of torque that are units of current."""
 _SAME_TORQUE = 0.5
 """Relative tolerance for matching torques. It may be large, because the units of 6076h differ by
 a factor of 1000."""
@@ -16,10 +18,18 @@ _RATED_Nm = {"mNm": 1e-3, "uNm": 1e-6}
 _RAD_S_PER_RPM = math.tau / 60.0
 
 
-def torque_unit_Nm(drive: DriveProfile, rated_torque_Nm: float) -> float:
-    """Return the torque of one unit of 6071h, 6072h, 6077h and, per second, of 6087h."""
-    share = _OF_RATED.get(drive.torque_unit)
-    return _ABSOLUTE_Nm[drive.torque_unit] if share is None else share * rated_torque_Nm
+def torque_unit_Nm(
+    drive: DriveProfile, rated_torque_Nm: float, constant_Nm_per_Arms: float
+) -> float:
+    """Return the torque of one unit of 6071h, 6072h, 6077h and, per second, of 6087h.
+
+    Rated torque and torque constant of the motor are the references of relative units and of
+    currents.
+    """
+    unit = drive.torque_unit
+    if unit in CURRENTS_Arms:
+        return CURRENTS_Arms[unit] * constant_Nm_per_Arms
+    return _OF_RATED[unit] * rated_torque_Nm if unit in _OF_RATED else _ABSOLUTE_Nm[unit]
 
 
 def rated_torque_unit_Nm(drive: DriveProfile) -> float:
@@ -62,13 +72,12 @@ def acceleration_unit_rad_s2(drive: DriveProfile, counts_per_turn: int) -> float
 
 
 def torque_settings(
-    drive: DriveProfile, rated_torque_Nm: float, limit_Nm: float
+    drive: DriveProfile, unit_Nm: float, limit_Nm: float
 ) -> Iterator[tuple[int, int]]:
     """Yield index and value of the objects that limit the torque: limit and, if given, slope.
 
     A limit that is not a whole number of units is rounded down.
     """
-    unit = torque_unit_Nm(drive, rated_torque_Nm)
-    yield 0x6072, min(whole_units(limit_Nm, unit), 0xFFFF) if unit > 0.0 else 0
-    if drive.torque_slope_Nm_s is not None and unit > 0.0:
-        yield 0x6087, round(min(drive.torque_slope_Nm_s / unit, 0xFFFFFFFF))
+    yield 0x6072, min(whole_units(limit_Nm, unit_Nm), 0xFFFF) if unit_Nm > 0.0 else 0
+    if drive.torque_slope_Nm_s is not None and unit_Nm > 0.0:
+        yield 0x6087, round(min(drive.torque_slope_Nm_s / unit_Nm, 0xFFFFFFFF))

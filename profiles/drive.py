@@ -13,8 +13,8 @@ Unsigned16 = Annotated[int, Field(ge=0, le=0xFFFF)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
 Mode = Annotated[int, Field(ge=-128, le=127)]
 
-TorqueUnit = Literal["per_mille_of_rated", "percent_of_rated", "mNm", "cNm"]
-"""Unit of 6071h, 6072h, 6077h, 60B2h and, per second, of 6087h."""
+TorqueUnit = Literal["per_mille_of_rated", "percent_of_rated", "mNm", "cNm", "mA_rms", "mA_peak"]
+"""Unit of 6071h, 6072h, 6077h, 60B2h and, per second, of 6087h; mA are of the motor's current."""
 RatedTorqueUnit = Literal["mNm", "uNm"]
 """Unit of 6076h, to which relative torque units refer."""
 VelocityUnit = Literal["counts_per_s", "rpm"]

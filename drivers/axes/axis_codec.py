@@ -20,7 +20,7 @@ EMCY, HEARTBEAT = 100, 101
 
 MAX_FIELDS = 8
 # columns of `command_offsets`
-CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
+CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE, TORQUE_BYTES = range(5)
 
 # rows of `ints`; the first ones are filled from TPDOs when they arrive
 (
@@ -278,7 +278,8 @@ def encode(
 ) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
-    `command_offsets` (n, 4) holds frame and first byte of each, `controlwords` (9, 9) the word by
+    `command_offsets` (n, 5) holds frame and first byte of each, and the number of bytes of the
+    torque; `controlwords` (9, 9) the word by
     target and present state. Returns the alarm bits of all axes.
     """
     alarms = 0
@@ -290,8 +291,8 @@ def encode(
         frames[row, at] = word & 0xFF
         frames[row, at + 1] = (word >> 8) & 0xFF
         row, at = command_offsets[i, TORQUE_FRAME], _DATA + command_offsets[i, TARGET_TORQUE]
-        frames[row, at] = units & 0xFF
-        frames[row, at + 1] = (units >> 8) & 0xFF
+        for k in range(command_offsets[i, TORQUE_BYTES]):
+            frames[row, at + k] = (units >> 8 * k) & 0xFF
         alarms |= ints[ALARM, i]
     return alarms
 

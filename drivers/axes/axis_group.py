@@ -108,8 +108,7 @@ class StateArrays:
             floats[codec.NM_PER_UNIT, i] = axis.Nm_per_unit
             ints[codec.TPDOS_EXPECTED, i] = axis.expected_tpdos
             most = whole_units(axis.torque_limit_Nm, abs(axis.Nm_per_unit))
-            # 6071h has 16 bits: a unit of mNm allows at most 32.767 Nm
-            floats[codec.LIMIT_UNITS, i] = min(most, 0x7FFF)
+            floats[codec.LIMIT_UNITS, i] = min(most, axis.most_torque_units)
             ints[codec.FRAMES_ALLOWED, i] = max(_FRAMES_A_CYCLE, round(_FRAMES_A_SECOND * period_s))
             timeout_s = _HEARTBEAT_TIMEOUT_PERIODS * axis.drive.heartbeat_producer_s
             ints[codec.HEARTBEAT_LIMIT, i] = max(2, round(timeout_s / period_s))

@@ -25,7 +25,8 @@ _TPDO_FIELDS = {
     0x60B9: codec.PROBE_STATUS,
     0x60BA: codec.PROBE_POSITION,
 }
-_BITS = {0x6041: 16, 0x6064: 32, 0x6077: 16, 0x6061: 8, 0x60B9: 16, 0x60BA: 32}
+_BYTES = {0x6041: (2,), 0x6064: (4,), 0x6077: (2, 4), 0x6061: (1,), 0x60B9: (2,), 0x60BA: (4,)}
+_COMMAND_BYTES = {0x6040: (2,), 0x6071: (2, 4)}
 _EVERY_CYCLE = (0x6041, 0x6064, 0x6077)
 _UNSIGNED = (0x6041, 0x60B9)
 _RPDO_FIELDS = {
@@ -50,6 +51,8 @@ class AxisConfig:
     supported_modes: int
     """6502h; the profile's modes if the drive has no 6502h."""
     torque_limit_Nm: float
+    torque_constant_Nm_per_Arms: float = 0.0
+    """Of the motor: the reference of a torque unit that is a current."""
     name: str = ""
     """Name for messages, next to the node id; may be empty."""
 
@@ -65,6 +68,7 @@ class AxisConfig:
             report.counts_per_turn,
             report.supported_modes,
             torque_limit_Nm,
+            report.torque_constant_Nm_per_Arms,
             name,
         )
 
@@ -81,7 +85,14 @@ class AxisConfig:
     @property
     def Nm_per_unit(self) -> float:
         """Motor torque of one unit of 6071h and 6077h, with the drive's sign."""
-        return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm)
+        constant = self.torque_constant_Nm_per_Arms
+        return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm, constant)
+
+    @property
+    def most_torque_units(self) -> int:
+        """Largest value of 6071h: 15 bits allow at most 32.767 Nm if the unit is mNm."""
+        entries = (entry for pdo in self.drive.rpdos for entry in pdo.entries)
+        return max(1 << entry.bits - 1 for entry in entries if entry.index == 0x6071) - 1
 
     def speed_units(self, speed_rad_s: float) -> int:
         """Return a speed in units of 6099h, at least one."""
@@ -110,8 +121,9 @@ class GroupLayout:
         """Axis and kind (TPDO number in the profile, EMCY, HEARTBEAT) by identifier."""
         self.fields: NDArray[np.int64] = np.zeros((len(axes), codec.MAX_FIELDS, 5), np.int64)
         """By axis, a list of fields: TPDO, target row, first byte, size, signed; size 0 ends it."""
-        self.command_offsets: NDArray[np.int64] = np.zeros((len(axes), 4), np.int64)
-        """By axis: row in `rpdos` and first byte, of the controlword and of the target torque."""
+        self.command_offsets: NDArray[np.int64] = np.zeros((len(axes), 5), np.int64)
+        """By axis: row in `rpdos` and first byte, of the controlword and of the target torque, and
+        number of bytes of the latter."""
         commands = [_command_rpdos(axis.drive) for axis in axes]
         self.rpdos = FrameBuffer(sum(len(pdos) for pdos in commands))
         """The RPDOs of all axes, to be filled and sent each cycle."""
@@ -139,10 +151,11 @@ class GroupLayout:
                 quantity = _TPDO_FIELDS.get(index)
                 if quantity is None or number != pdo_of.get(index, number):
                     continue
-                if 8 * size != _BITS[index]:
+                if size not in _BYTES[index]:
+                    allowed = " or ".join(str(8 * one) for one in _BYTES[index])
                     raise DriverError(
                         f"drive profile {axis.drive.name!r}: tpdos: {index:04X}h has {8 * size} "
-                        f"bits; allowed: {_BITS[index]}"
+                        f"bits; allowed: {allowed}"
                     )
                 if quantity in self.fields[i, :row, 1]:
                     continue
@@ -166,7 +179,9 @@ class GroupLayout:
             frame = self.rpdos.array[row]
             frame["can_id"] = pdo.cob_id(axis.node_id)
             frame["length"] = sum(entry.bits for entry in pdo.entries) // 8
-            for index, start, _ in _places(pdo):
+            for index, start, size in _places(pdo):
+                if index == 0x6071:
+                    self.command_offsets[i, codec.TORQUE_BYTES] = size
                 if index in _RPDO_FIELDS:
                     frame_column, byte_column = _RPDO_FIELDS[index]
                     self.command_offsets[i, frame_column], self.command_offsets[i, byte_column] = (
@@ -200,12 +215,12 @@ def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
     found: dict[int, Pdo] = {}
     for index in _RPDO_FIELDS:
         for pdo in drive.rpdos:
-            if any(index == i and size == 2 for i, _, size in _places(pdo)):
+            if any(index == i and size in _COMMAND_BYTES[i] for i, _, size in _places(pdo)):
                 found[index] = pdo
         if index not in found:
             raise DriverError(
-                f"drive profile {drive.name!r}: rpdos: no RPDO contains {index:04X}h with 16 bits, "
-                "which torque control needs"
+                f"drive profile {drive.name!r}: rpdos: no RPDO contains {index:04X}h with 16 bits "
+                "(6071h: 16 or 32), which torque control needs"
             )
     pdos = [pdo for pdo in drive.rpdos if pdo in found.values()]
     for index in (entry.index for pdo in pdos for entry in pdo.entries):

@@ -53,7 +53,8 @@ def monitored_axis(winch: Winch, node_id: int, name: str = "") -> AxisConfig:
     motor = winch.motor
     torque_Nm = motor.rated_torque_Nm
     counts = winch.encoder_counts_per_turn
-    return AxisConfig(node_id, winch.drive, torque_Nm, counts, 0, torque_Nm, name)
+    constant = motor.torque_constant_Nm_per_Arms
+    return AxisConfig(node_id, winch.drive, torque_Nm, counts, 0, torque_Nm, constant, name)
 
 
 class ListeningDevice:

@@ -15,7 +15,12 @@ from cdpr_drivers.canopen.configuration import BootSettings, configure, make_con
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.canopen.sdo import ABSENT
 from cdpr_drivers.cia402 import State, mode_bits, state_of
-from cdpr_drivers.drive_units import VELOCITY_UNITS, rated_torque_unit_Nm, suspected_unit
+from cdpr_drivers.drive_units import (
+    VELOCITY_UNITS,
+    CURRENTS_Arms,
+    rated_torque_unit_Nm,
+    suspected_unit,
+)
 from cdpr_drivers.errors import (
     BootError,
     BusError,
@@ -102,6 +107,7 @@ class BootReport:
     revision: int = 0
     serial: int = 0
     rated_torque_Nm: float = 0.0
+    torque_constant_Nm_per_Arms: float = 0.0
     counts_per_turn: int = 0
     supported_modes: int = 0
     changed: list[str] = field(default_factory=list)
@@ -380,6 +386,7 @@ class _NodeBoot:
         try:
             report.device_name = self._device_name()
             report.rated_torque_Nm = self._rated_torque_Nm()
+            report.torque_constant_Nm_per_Arms = self._settings.torque_constant_Nm_per_Arms
             increments, turns = self._counts_per_turn()
             if 0x6502 in self._dictionary:
                 report.supported_modes = self._read_int(0x6502)
@@ -398,6 +405,13 @@ class _NodeBoot:
                 f"rated torque {report.rated_torque_Nm} Nm (6076h) or encoder resolution "
                 f"{increments}/{turns} (608Fh) are not plausible",
                 "set the drive's motor data first",
+            )
+        if self._profile.torque_unit in CURRENTS_Arms and not report.torque_constant_Nm_per_Arms:
+            raise self._error(
+                "J",
+                f"its torque unit is {self._profile.torque_unit}, but the motor's torque constant "
+                "is not known here",
+                "choose a drive with another torque unit",
             )
         report.counts_per_turn = increments // turns
         self._check_velocity_unit(velocity_unit)

@@ -11,7 +11,7 @@ from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, OD
 
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.canopen.sdo import ABSENT
-from cdpr_drivers.drive_units import torque_settings
+from cdpr_drivers.drive_units import torque_settings, torque_unit_Nm
 from cdpr_drivers.errors import DriverError, SdoAbortError
 from cdpr_profiles import DriveProfile, Pdo
 
@@ -35,6 +35,8 @@ class BootSettings:
     """Required value of 6076h, also used if the drive lacks it; None leaves it unchecked."""
     counts_per_turn: int | None = None
     """Encoder resolution of a drive that has no 608Fh."""
+    torque_constant_Nm_per_Arms: float = 0.0
+    """Of the motor, for a drive whose torques are currents."""
     mandatory: bool = True
     """Whether other drives may start only with this one (CiA 302-2, 1F81h bit 3)."""
 
@@ -249,7 +251,7 @@ def make_configuration(
 ) -> Configuration:
     """Return the configuration that the master writes into a drive.
 
-    `rated_torque_Nm` is the reference of the drive's torque unit, `watch_entry` the sub-index of
+    `rated_torque_Nm` is the reference of a relative torque unit, `watch_entry` the sub-index of
     1016h that monitors the master. PDOs of the EDS that the profile does not have are switched off,
     because the bus budget excludes them. Raises DriverError for objects that the EDS cannot accept.
     """
@@ -260,7 +262,8 @@ def make_configuration(
     build.put(0x1017, 0, round(profile.heartbeat_producer_s * 1e3))
     build.put(0x6007, 0, _QUICK_STOP)  # if the master's heartbeat is lost
     build.put(0x605A, 0, _SLOW_DOWN_THEN_OFF)
-    for index, value in torque_settings(profile, rated_torque_Nm, settings.torque_limit_Nm):
+    unit_Nm = torque_unit_Nm(profile, rated_torque_Nm, settings.torque_constant_Nm_per_Arms)
+    for index, value in torque_settings(profile, unit_Nm, settings.torque_limit_Nm):
         build.put(index, 0, value)
     build.put(0x60B2, 0, 0)  # an earlier torque offset would be added to every torque
     for pdos, first in ((profile.rpdos, _RPDO), (profile.tpdos, _TPDO)):

@@ -298,11 +298,18 @@ class KnownNode:
     drive: DriveProfile
     rated_torque_Nm: float | None = None
     counts_per_turn: int | None = None
+    torque_constant_Nm_per_Arms: float = 0.0
 
     @classmethod
     def of_winch(cls, winch: Winch) -> KnownNode:
         """Return the node that a winch's file describes."""
-        return cls(winch.drive, winch.motor.rated_torque_Nm, winch.encoder_counts_per_turn)
+        motor = winch.motor
+        return cls(
+            winch.drive,
+            motor.rated_torque_Nm,
+            winch.encoder_counts_per_turn,
+            motor.torque_constant_Nm_per_Arms,
+        )
 
 
 class Decoder:
@@ -353,6 +360,7 @@ class Decoder:
                 view.drive = known.drive
                 view.rated_torque_Nm = known.rated_torque_Nm
                 view.counts_per_turn = known.counts_per_turn
+                view.torque_constant_Nm_per_Arms = known.torque_constant_Nm_per_Arms
                 self._pdos.load(view, "RPDO", known.drive.rpdos)
                 self._pdos.load(view, "TPDO", known.drive.tpdos)
         return view

@@ -102,6 +102,8 @@ _HOMING, _CYCLIC = 6, (8, 9, 10)
 _RELATIVE_TORQUE_UNITS = {
     "per_mille_of_rated": "per mille of rated",
     "percent_of_rated": "percent of rated",
+    "mA_rms": "mA",
+    "mA_peak": "mA (peak)",
 }
 _SHOWN_BYTES = 32
 _MICRO, _MILLI = 1e-6, 1e-3
@@ -135,15 +137,16 @@ class NodeView:
     drive: DriveProfile | None = None
     rated_torque_Nm: float | None = None
     counts_per_turn: int | None = None
+    torque_constant_Nm_per_Arms: float = 0.0
     mode: int | None = None
 
     def torque_Nm(self) -> float | None:
         """Motor torque of one unit of 6077h, with the drive's sign; None if unknown."""
         if self.drive is None:
             return None
-        if self.rated_torque_Nm is None and self.drive.torque_unit in _RELATIVE_TORQUE_UNITS:
-            return None
-        return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm or 0.0)
+        constant = self.torque_constant_Nm_per_Arms
+        unit_Nm = torque_unit_Nm(self.drive, self.rated_torque_Nm or 0.0, constant)
+        return self.drive.torque_sign * unit_Nm if unit_Nm > 0.0 else None
 
     def position_rad(self) -> float | None:
         """Motor angle of one unit of 6064h, with the drive's sign; None if unknown."""

@@ -218,7 +218,9 @@ class Cia402RailAxis:
         self._turn = report.counts_per_turn
         sign = self._map.direction * drive.position_sign
         self._m_per_count = sign * self._map.travel_per_turn_m / self._turn
-        self._push_unit = torque_unit_Nm(drive, report.rated_torque_Nm)
+        self._push_unit = torque_unit_Nm(
+            drive, report.rated_torque_Nm, report.torque_constant_Nm_per_Arms
+        )
         self._rated_Nm = report.rated_torque_Nm
         self._clock = network.clock
         self._pushing = False

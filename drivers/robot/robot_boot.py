@@ -115,6 +115,7 @@ def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
         torque_Nm,
         rated_torque_Nm=winch.motor.rated_torque_Nm,
         counts_per_turn=winch.encoder_counts_per_turn,
+        torque_constant_Nm_per_Arms=winch.motor.torque_constant_Nm_per_Arms,
     )
 
 

@@ -199,9 +199,9 @@ class Axis:
     def configure(self) -> None:
         """Read limits and windows from the dictionary."""
         get, m = self.od.get_int, self.motor
-        unit = self.quirks.torque_unit_Nm or (1e-3 * get(0x6076) * self.quirks.rated_torque_unit_Nm)
-        m["torque_unit"] = unit
         constant = self.ratings.torque_constant_Nm_per_Arms
+        unit = self.quirks.unit_Nm(get(0x6076) * self.quirks.rated_torque_unit_Nm, constant)
+        m["torque_unit"] = unit
         m["rated_current"] = get(0x6075) * 1e-3 * constant
         peak = min(self.ratings.peak_torque_Nm, get(0x6073) * get(0x6075) * 1e-6 * constant)
         most = min(peak, get(0x6072) * unit)

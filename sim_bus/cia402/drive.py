@@ -341,9 +341,9 @@ def _adapt(od: ObjectDictionary, quirks: DriveQuirks, plant: Plant, ratings: Mot
     _default(od.entry(0x608F, 1), counts)
     _default(od.entry(0x6075), round(ratings.rated_current_Arms * 1e3))
     _default(od.entry(0x6076), round(ratings.rated_torque_Nm / quirks.rated_torque_unit_Nm))
-    unit = quirks.torque_unit_Nm or 1e-3 * ratings.rated_torque_Nm
+    unit = quirks.unit_Nm(ratings.rated_torque_Nm, ratings.torque_constant_Nm_per_Arms)
     for index in (0x6072, 0x60E0, 0x60E1):
-        _default(od.entry(index), round(ratings.peak_torque_Nm / unit))
+        _default(od.entry(index), min(round(ratings.peak_torque_Nm / unit), 0xFFFF))
     _default(od.entry(0x6073), round(1e3 * ratings.peak_current_Arms / ratings.rated_current_Arms))
     _default(od.entry(0x6080), round(ratings.rated_speed_rad_s * 60.0 / (2.0 * math.pi)))
 

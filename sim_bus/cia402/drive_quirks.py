@@ -44,6 +44,8 @@ class DriveQuirks:
 
     torque_unit_Nm: float | None = None
     """Unit of the torque objects; None: per mille of 6076h."""
+    torque_in_mA: bool = False
+    """Torque objects in mA (rms) of the motor's current, instead of `torque_unit_Nm`."""
     rated_torque_unit_Nm: float = 1e-3
     """Unit of 6076h."""
     velocity_in_rpm: bool = False
@@ -65,6 +67,12 @@ class DriveQuirks:
     """Minimum time from a write to 6060h until 6061h shows the mode."""
     enable_delay_s: float = 0.0
     """Minimum time from the enable operation command until the state is reached."""
+
+    def unit_Nm(self, rated_torque_Nm: float, constant_Nm_per_Arms: float) -> float:
+        """Return the torque of one unit of the torque objects."""
+        if self.torque_in_mA:
+            return 1e-3 * constant_Nm_per_Arms
+        return self.torque_unit_Nm or 1e-3 * rated_torque_Nm
 
     def supported_modes(self, announced: int) -> frozenset[int]:
         """Return the modes to which 6060h may be set, including 0 (no mode).
@@ -113,6 +121,7 @@ _QUIRKS = {
 _VENDOR_QUIRKS = {
     # maxon EPOS4: motor rated torque in uNm, velocities in rpm, accelerations in rpm/s
     0x000000FB: DriveQuirks(rated_torque_unit_Nm=1e-6, velocity_in_rpm=True),
+    0x00000286: DriveQuirks(torque_in_mA=True),  # Trinamic
 }
 """Quirks of all products of a vendor that have no entry in `_QUIRKS`."""
 

@@ -24,6 +24,8 @@ def drive(**keys: object) -> DriveProfile:
         ("percent_of_rated", 0.024, 20),  # rounded down: a limit is never exceeded
         ("mNm", 0.001, 500),
         ("cNm", 0.01, 50),
+        ("mA_rms", 0.0005, 1000),
+        ("mA_peak", 0.0005 / 2.0**0.5, 1414),
     ],
 )
 @pytest.mark.parametrize("sign", [1, -1])
@@ -31,18 +33,24 @@ def test_torques_are_converted_to_each_torque_unit(
     unit: str, step_Nm: float, half_a_Nm: int, sign: int
 ) -> None:
     one = drive(torque_unit=unit, torque_sign=sign)
-    assert torque_unit_Nm(one, 2.4) == pytest.approx(step_Nm)
-    axis = AxisConfig(1, one, 2.4, 8192, 0x3AD, 2.0)
+    assert torque_unit_Nm(one, 2.4, 0.5) == pytest.approx(step_Nm)
+    axis = AxisConfig(1, one, 2.4, 8192, 0x3AD, 2.0, 0.5)
     assert axis.Nm_per_unit == pytest.approx(sign * step_Nm)
     # the drive's limit has no sign
-    assert list(torque_settings(one, 2.4, 0.5)) == [(0x6072, half_a_Nm)]
+    assert list(torque_settings(one, step_Nm, 0.5)) == [(0x6072, half_a_Nm)]
 
 
 def test_a_torque_slope_is_per_second_and_clamped_to_its_object() -> None:
     slow = drive(torque_unit="cNm", torque_slope_Nm_s=20.0)
-    assert list(torque_settings(slow, 3.0, 1.0)) == [(0x6072, 100), (0x6087, 2000)]
+    assert list(torque_settings(slow, 1e-2, 1.0)) == [
+        (0x6072, 100),
+        (0x6087, 2000),
+    ]
     fast = drive(torque_unit="mNm", torque_slope_Nm_s=1e9)
-    assert list(torque_settings(fast, 3.0, 100.0)) == [(0x6072, 0xFFFF), (0x6087, 0xFFFFFFFF)]
+    assert list(torque_settings(fast, 1e-3, 100.0)) == [
+        (0x6072, 0xFFFF),
+        (0x6087, 0xFFFFFFFF),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -295,6 +295,31 @@ def test_a_drive_that_counts_in_other_units_runs_and_the_boot_names_a_wrong_unit
     assert 'write velocity_unit = "rpm" into the profile' in problem
 
 
+def test_a_drive_with_torques_of_32_bits_in_mA_is_imported_and_turns_its_motor(
+    tmp_path: Path,
+) -> None:
+    """The simulated drive of this vendor id has 6071h and 6077h in mA of the motor's current."""
+    text = with_key("1018sub1", "DefaultValue", "0x286")
+    for index in ("6071", "6077"):
+        text = with_key(index, "DataType", "0x0004", text)
+        text = with_key(index, "LowLimit", "", with_key(index, "HighLimit", "", text))
+    path = tmp_path / "ampere.eds"
+    path.write_text(text)
+    facts = imported(path, tmp_path)["facts"]
+    assert facts["torque_unit"]["value"] == "mA_rms"
+    torques = [
+        entry["bits"]
+        for pdos in ("rpdos", "tpdos")
+        for pdo in facts[pdos]["value"]
+        for entry in pdo["entries"]
+        if entry["index"] in (0x6071, 0x6077)
+    ]
+    assert torques == [32, 32]
+    winch = winch_with("ampere", tmp_path)
+    status, problem = jogged(winch)
+    assert status == 0, problem
+
+
 def test_pdo_maps_are_proposed_if_the_defaults_do_not_suffice(tmp_path: Path) -> None:
     text = TEXT
     for number in range(4):

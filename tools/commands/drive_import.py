@@ -31,10 +31,10 @@ _COMMAND = (0x6040, 0x6071)
 _FEEDBACK = (0x6041, 0x6064, 0x6077)
 _EXTRA = (_MODE_SHOWN, _PROBE_STATUS, _PROBE_POSITION)
 _BITS = {
-    **{0x6040: 16, 0x6071: 16, 0x6041: 16, 0x6064: 32, 0x6077: 16},
-    **{_MODE_SHOWN: 8, _PROBE_STATUS: 16, _PROBE_POSITION: 32},
+    **{0x6040: (16,), 0x6071: (16, 32), 0x6041: (16,), 0x6064: (32,), 0x6077: (16, 32)},
+    **{_MODE_SHOWN: (8,), _PROBE_STATUS: (16,), _PROBE_POSITION: (32,)},
 }
-"""Sizes that CiA 402 defines for the objects exchanged in a cycle."""
+"""Sizes of the objects exchanged in a cycle; torques with 32 bits are not of CiA 402."""
 _HARMLESS = (*_COMMAND, 0x60B2)
 """Objects allowed in a mapped RPDO; except for the commands, they are sent as zero each cycle."""
 _MOST_PDOS = 512
@@ -296,9 +296,14 @@ _ASSUMPTIONS = {
     "heartbeat_consumer_s": (0.5, "our choice, written to 1016h"),
 }
 _MAKERS = {
-    0x000000FB: {"rated_torque_unit": ("uNm", "maxon: Motor rated torque of the EPOS4 is in uNm")},
+    0x000000FB: {
+        "rated_torque_unit": ("uNm", _MANUAL, "maxon: Motor rated torque of the EPOS4 is in uNm")
+    },
+    0x00000286: {
+        "torque_unit": ("mA_rms", _ASSUMED, "Trinamic: current in mA; mA_peak gives 1.4 times more")
+    },
 }
-"""Keys that a maker's manuals give for all its drives, by vendor id."""
+"""Keys that hold for all drives of a maker, by vendor id."""
 _CONSEQUENCES = {
     0x1006: "the drive does not know the cycle's period",
     0x1008: "the boot cannot show the device's name",
@@ -323,13 +328,14 @@ def propose(eds: DataSheet) -> Proposal:
     for index in (*_COMMAND, *_FEEDBACK):
         eds.require(index, "torque control needs it")
         entry = eds.get(index)
-        if entry is None or bits_of(entry) != _BITS[index]:
+        if entry is None or bits_of(entry) not in _BITS[index]:
             has = (
                 "is not a variable"
                 if entry is None
                 else (f"value 0x{entry.data_type:04X} has {bits_of(entry)} bits")
             )
-            problem = f"{has}; allowed: one of {_BITS[index]} bits"
+            allowed = " or ".join(map(str, _BITS[index]))
+            problem = f"{has}; allowed: one of {allowed} bits"
             raise ProfileError(eds.path, f"[{index:04X}] DataType", problem)
     for index in (0x6060, _MODE_SHOWN):
         eds.require(index, "without it no mode of operation can be chosen and confirmed")
@@ -397,8 +403,8 @@ def _identity(made: Proposal, eds: DataSheet) -> None:
 
 def _units(made: Proposal, eds: DataSheet) -> None:
     """Set the units that the drive states itself (60A9h) or that its maker is known for."""
-    for key, (value, how) in _MAKERS.get(made.table["vendor_id"], {}).items():
-        made.set(key, value, _MANUAL, how)
+    for key, (value, status, how) in _MAKERS.get(made.table["vendor_id"], {}).items():
+        made.set(key, value, status, how)
     unit = VELOCITY_UNITS.get(_number(eds, 0x60A9) or 0)
     if unit is None:
         made.find_out("other_units")
@@ -558,7 +564,7 @@ def _choose_tpdos(eds: DataSheet) -> _Choice:
         if offer.holds(extra):
             entries = list(offer.entries)
         elif offer.room:
-            entries = _whole(extra[: offer.room])
+            entries = _whole(eds, extra[: offer.room])
         else:
             continue
         return _Choice([*choice.pdos, offer.table(entries, _SYNC_WHEN_CHANGED)], choice.how)
@@ -579,15 +585,17 @@ def _choose(
             return _Choice([offer.table(offer.entries, _EVERY_SYNC)], "map by default in the EDS")
     blocked = [index for index in objects if not _mappable(eds, index)]
     for offer in usable:
-        if not blocked and offer.room >= len(objects):
+        whole = _whole(eds, objects[: offer.room]) if not blocked else []
+        if len(whole) == len(objects):
             how = "a map chosen here; according to the EDS it can be written"
-            return _Choice([offer.table(_whole(objects), _EVERY_SYNC)], how)
+            return _Choice([offer.table(whole, _EVERY_SYNC)], how)
     missing, chosen = list(objects), []
     for offer in usable:
         if offer in as_they_are and any(offer.holds([index]) for index in missing):
             entries = list(offer.entries)
         else:
-            entries = _whole([index for index in missing if index not in blocked][: offer.room])
+            free = [index for index in missing if index not in blocked]
+            entries = _whole(eds, free[: offer.room])
         if entries:
             chosen.append(offer.table(entries, _EVERY_SYNC))
             missing = [index for index in missing if index not in {e[0] for e in entries}]
@@ -664,11 +672,18 @@ def _entries(eds: DataSheet, mapping: int) -> tuple[_Entry, ...]:
 
 def _mappable(eds: DataSheet, index: int) -> bool:
     entry = eds.get(index)
-    return entry is not None and entry.pdo_mappable and bits_of(entry) == _BITS[index]
+    return entry is not None and entry.pdo_mappable and bits_of(entry) in _BITS[index]
 
 
-def _whole(indexes: Sequence[int]) -> list[_Entry]:
-    return [(index, 0, _BITS[index]) for index in indexes]
+def _whole(eds: DataSheet, indexes: Sequence[int]) -> list[_Entry]:
+    """Return entries of whole objects, without those that do not fit the frame."""
+    found: list[_Entry] = []
+    for index in indexes:
+        entry = eds.get(index)
+        bits = _FRAME_BITS + 1 if entry is None else bits_of(entry)
+        if sum(one[2] for one in found) + bits <= _FRAME_BITS:
+            found.append((index, 0, bits))
+    return found
 
 
 # The profile as TOML.
