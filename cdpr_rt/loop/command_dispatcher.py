@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -29,6 +29,9 @@ _OBEYED = "accepted; its end is not reported"
 _MOVING = frozenset({"enable", "program", "set"})
 _CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
 """Commands that change the state or the running program."""
+_ASIDE: Final = frozenset({"lengths", "object"})
+"""Commands that cancel no deferred command."""
+_MOST_OBJECT_BYTES: Final = 500
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,12 @@ class _Deferred:
     program: Program
     state: LoopState
     """State when the command arrived; `program` is the program that ran at that time."""
+
+
+class _Result(str):
+    """Text of a reply to a command that succeeded."""
+
+    __slots__ = ()
 
 
 class CommandDispatcher:
@@ -67,6 +76,8 @@ class CommandDispatcher:
         self._void = 0
         """Commands up to this number arrived before a stop from `stops`."""
         self._deferred: _Deferred | None = None
+        self._reading: tuple[Command, Task[bytes]] | None = None
+        """A command that reads an object of a drive."""
         self._replies: list[tuple[int | StopRequest, CommandRefusal | str]] = []
         self._counters = engine.block.counters
         # a memoryview, because it is read in every cycle and faster
@@ -84,6 +95,7 @@ class CommandDispatcher:
             "set": self._set,
             "hold": self._hold,
             "lengths": self._lengths,
+            "object": self._object,
             "shutdown": self._shutdown,
         }
 
@@ -113,6 +125,8 @@ class CommandDispatcher:
             self._take(self._commands_taken, self._engine.block.take_command)
         elif self._deferred is not None and self._deferred.task.done:
             self._resume(self._deferred)
+        if self._reading is not None and self._reading[1].done:
+            self._answer_reading(*self._reading)
 
     def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
         try:
@@ -147,7 +161,9 @@ class CommandDispatcher:
         deferred = self._deferred
         if deferred is not None and deferred.command is command:
             return  # the reply follows when the command is resumed
-        if deferred is not None and do != "lengths":
+        if self._reading is not None and self._reading[0] is command:
+            return  # the reply follows when the drive has answered
+        if deferred is not None and do not in _ASIDE:
             self._cancel(deferred, _ANOTHER)
         if do in _CHANGING:
             what = command["program"] if do == "program" else do
@@ -212,7 +228,8 @@ class CommandDispatcher:
         refusal = {"refusal": error.as_json()} if isinstance(error, CommandRefusal) else {}
         # a character may take a dozen bytes
         for most, more in ((_MOST_TEXT, refusal), (_MOST_TEXT, {}), (_SHORT_TEXT, {})):
-            reply = {"ok": not text, "text": text[:most], "state": state, **more}
+            is_done = not text or isinstance(error, _Result)
+            reply = {"ok": is_done, "text": text[:most], "state": state, **more}
             if isinstance(to, StopRequest):
                 to.answer(reply)
                 return
@@ -314,6 +331,43 @@ class CommandDispatcher:
                     f"cable_length_m[{i}]: {length!r}; allowed: above 0, up to {_LONGEST_CABLE_m:g}"
                 )
         return np.array([math.nan if length is None else length for length in lengths])
+
+    def _object(self, command: Command) -> Steps | None:
+        """Read an object of a drive in parallel with the cycles, or write one without power."""
+        machine, state = self._engine.machine, self._life.state
+        axis, index, sub = (int(command[key]) for key in ("axis", "index", "sub"))
+        if machine.device is None:
+            raise RefusedError("object: the drives have not booted")
+        if not 0 <= axis < machine.device.n:
+            raise RefusedError(f"axis: {axis}; allowed: 0 to {machine.device.n - 1}")
+        if command.get("value") is None:
+            if self._reading is not None or self._runner.busy:
+                raise RefusedError(f"object: {self._occupied()}")
+            read = partial(machine.read_object, axis, index, sub)
+            self._reading = command, machine.clock.start(read)
+            return None
+        self._refuse_read_only("object")
+        if state not in (LoopState.INACTIVE, LoopState.READY):
+            raise RefusedError(
+                f"object: written without power only, because a changed setting may move a drive; "
+                f"the state is {state.label}"
+            )
+        if self._runner.busy:
+            raise RefusedError(f"object: {self._occupied()}")
+        self._right("object", command)
+        value = int(command["value"])
+        return self._transitions.write_object(
+            partial(machine.write_object, axis, index, sub, value)
+        )
+
+    def _answer_reading(self, command: Command, task: Task[bytes]) -> None:
+        self._reading = None
+        try:
+            data = task.result()
+        except Exception as error:  # a drive may send anything
+            self._reply(_number(command), str(error) or type(error).__name__)
+        else:
+            self._reply(_number(command), _Result(data[:_MOST_OBJECT_BYTES].hex() or "-"))
 
     # -- preconditions
 

@@ -169,6 +169,7 @@ class StatusPage:
                 "cycles": 0 if engine.cycle is None else engine.cycle.device.feedback.cycle,
                 "late": 0 if lateness is None else lateness.late,
                 "worst_late_s": 0.0 if lateness is None else lateness.worst_s,
+                "heartbeat_age_s": engine.machine.heartbeat_age_s() if engine.cycling else [],
             },
         }
 

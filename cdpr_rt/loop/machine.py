@@ -71,6 +71,12 @@ class Machine(Protocol):
     def explain(self) -> Sequence[Fault]:
         """Return the faults that drives and the safety I/O report now."""
 
+    def read_object(self, axis: int, index: int, sub: int) -> bytes:
+        """Return the data of an object of an axis' drive; also while it has power."""
+
+    def write_object(self, axis: int, index: int, sub: int, value: int) -> None:
+        """Write an integer object of an axis' drive, while no cycles run."""
+
     def close(self) -> str:
         """Remove the drives' power and close the buses; return the drive that does not confirm, or
         "".
@@ -83,6 +89,9 @@ class Machine(Protocol):
 
     def bus_state(self) -> dict[str, Any]:
         """Return the known state of each bus, by its name."""
+
+    def heartbeat_age_s(self) -> list[float]:
+        """Return the time since each drive's last heartbeat, while cycles run."""
 
     def prepared(self) -> bool:
         """Whether the drives confirm the settings of `prepare`."""

@@ -175,6 +175,26 @@ class Transitions:
         self._engine.start_cycles()
         task.result()
 
+    def write_object(self, work: Callable[[], None]) -> Steps:
+        """Let `work` write an object of a drive without power, then boot and check all drives.
+
+        The boot restores all settings on which the loop relies. It follows even if the drive
+        rejects the object.
+        """
+        if self._engine.cycling:
+            self._engine.stop_cycles()
+            yield from self._runner.run_task(self._machine.pause)
+        self._life.enter(LoopState.INACTIVE)
+        rejected: ControlError | None = None
+        try:
+            yield from self._runner.run_task(work)
+        except ControlError as error:
+            rejected = error
+        yield from self.configure()
+        yield from self.check()
+        if rejected is not None:
+            raise rejected
+
     # -- power
 
     def enable(self, program: str, arguments: Mapping[str, Any], right: int) -> Steps:

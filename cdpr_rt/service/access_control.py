@@ -23,8 +23,8 @@ from cdpr_profiles.bounded_input import is_mostly_text
 from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service.page import PAGE_PREFIX
 
-# A ticket replaces the key for opening one WebSocket, because browsers cannot send a header with
-# that request.
+# A ticket replaces the key for opening one WebSocket or downloading one recording, because browsers
+# cannot send a header with these requests.
 
 VALID_S: Final = 30.0
 MOST_TICKETS: Final = 64
@@ -78,6 +78,9 @@ _PUBLIC_PATHS = frozenset({"/", "/status", "/docs", "/openapi.json"})
 _LOCAL_PATHS: Final = frozenset({"/page-address"})
 _KEYLESS_STOPS = frozenset({("http", "POST", "/hold"), ("http", "POST", "/disable")})
 _LIVE_PATH = "/live"
+_DOWNLOADS: Final = "/recordings/"
+PROGRESS: Final = "cdpr_rt.progress"
+"""Key of a scope: a number that grows while an answer is being made or sent."""
 _HEADERS = [(b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store")]
 
 
@@ -149,7 +152,7 @@ class AccessControl:
     all requests. Clients of the Unix socket all belong to one user and have no common rate limit.
     `refused` is called for every rejected client. `holds_right` returns whether a token belongs to
     the client that may move the robot, which a flood from its own address must not block. If a key
-    is required, one of `tickets` opens a WebSocket.
+    is required, one of `tickets` opens a WebSocket, or downloads one recording.
     """
 
     def __init__(
@@ -197,6 +200,7 @@ class AccessControl:
                 if message["type"] == "http.response.start":
                     message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
                 await send(message)
+                note_progress(scope)
 
             if not _is_stop(scope):
                 async with self._turns:
@@ -274,7 +278,8 @@ class AccessControl:
         return right and scheme.lower() == b"bearer"
 
     def _has_ticket(self, scope: Scope) -> bool:
-        if scope["type"] != "websocket" or self._policy.key is None:
+        downloads = scope.get("method") == "GET" and scope["path"].startswith(_DOWNLOADS)
+        if self._policy.key is None or not (scope["type"] == "websocket" or downloads):
             return False
         try:
             query = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=_MOST_FIELDS)
@@ -330,6 +335,11 @@ class TokenBuckets:
         if len(self._peers) > _MOST_PEERS:
             self._peers.popitem(last=False)
         return allowed
+
+
+def note_progress(scope: Scope) -> None:
+    """Note that the answer to a request advances, so that its connection is not ended."""
+    scope[PROGRESS] = scope.get(PROGRESS, 0) + 1
 
 
 def _is_stop(scope: Scope) -> bool:

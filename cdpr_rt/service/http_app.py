@@ -41,6 +41,8 @@ from cdpr_rt.service.link import (
     Reply,
 )
 from cdpr_rt.service.page import add_page
+from cdpr_rt.service.recording_folder import RecordingsBusyError
+from cdpr_rt.service.recording_routes import add_recordings
 from cdpr_rt.service.rows import newest_row
 from cdpr_rt.service.service import InjectionError, PlannerBusyError, Service
 from cdpr_rt.service.setpoint_stream import StreamError
@@ -260,6 +262,7 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     CommandTooLongError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     StreamError: HTTPStatus.NOT_FOUND,
     InjectionError: HTTPStatus.CONFLICT,
+    RecordingsBusyError: HTTPStatus.CONFLICT,
 }
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
@@ -319,7 +322,9 @@ def create_app(service: Service) -> FastAPI:
     _add_open_commands(app, service)
     _add_motion(app, service)
     _add_path(app, service)
+    _add_drives(app, service)
     _add_simulation(app, service)
+    add_recordings(app, service)
     WebSocketRoutes(service).add(app)
     add_page(app)
     _add_key(app)
@@ -479,7 +484,7 @@ def _add_control(app: FastAPI, service: Service) -> None:
     async def ticket() -> models.Ticket:
         """Get a ticket for one WebSocket without the key: `/live?ticket=T`, `/control?ticket=T`.
 
-        For browsers, which send no `Authorization` with those.
+        Or for one download of a recording. For browsers, which send no `Authorization` with those.
         """
         return models.Ticket(ticket=service.tickets.issue(), valid_s=VALID_S)
 
@@ -552,6 +557,42 @@ def _add_motion(app: FastAPI, service: Service) -> None:
     async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
         """Set the present lengths of the cables: `cable_length_m`, one for each axis or null."""
         return await ask("lengths", body, token, request, wanted=body.wanted)
+
+
+def _add_drives(app: FastAPI, service: Service) -> None:
+    @app.get("/drives")
+    async def drives() -> models.Drives:
+        """What the drives report, as text, and the planned load of the buses."""
+        texts, row = service.drives, newest_row(service.block)
+        if texts is None or row is None:
+            return models.Drives(drives=[], buses=[])
+        words = row["statusword"].tolist()
+        found = await asyncio.to_thread(
+            lambda: {"drives": texts.drives(words), "buses": texts.buses()}
+        )
+        return models.Drives.model_validate(found)
+
+    @app.post("/object", responses=_REFUSALS)
+    async def drive_object(
+        body: models.ObjectRequest, request: Request, token: Token = None
+    ) -> models.DriveObject:
+        """Read an object of a drive; or write an integer without power, with the right to move.
+
+        After writing, all drives boot again.
+        """
+        fields = {"axis": body.axis, "index": body.index, "sub": body.sub, "value": body.value}
+        if body.value is None:
+            reply = await service.command("object", body.client, **fields)
+        else:
+            gone = request.is_disconnected
+            reply = await service.command_with_right("object", body.client, token, gone, **fields)
+        text, texts = _done(reply).text, service.drives
+        data = bytes.fromhex(text.strip("-"))
+        if texts is None or body.value is not None:
+            written = body.value is not None
+            return models.DriveObject(name="", text="written" if written else text, raw=text)
+        found = await asyncio.to_thread(texts.object, body.axis, body.index, body.sub, data)
+        return models.DriveObject.model_validate(found)
 
 
 def _add_simulation(app: FastAPI, service: Service) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 from pydantic_core import ErrorDetails
@@ -191,6 +191,18 @@ class Set(ClientRequest):
     wanted: _Wanted
 
 
+class ObjectRequest(ClientRequest):
+    """An object of a drive, to read or to write."""
+
+    axis: Annotated[int, Field(ge=0, le=63, description="Number of the axis, from 0.")]
+    index: Annotated[int, Field(ge=0, le=0xFFFF)]
+    sub: Annotated[int, Field(ge=0, le=0xFF)] = 0
+    value: Annotated[
+        int | None,
+        Field(ge=-(1 << 63), lt=1 << 64, description="Write this integer; without it, only read."),
+    ] = None
+
+
 class _Answer(BaseModel):
     model_config = ConfigDict(extra="allow")
 
@@ -344,3 +356,103 @@ class Events(_Answer):
     """The last events, oldest first."""
 
     events: list[Event]
+
+
+class Quantity(_Answer):
+    """A quantity of a cycle; its unit is the end of its name."""
+
+    name: str
+    meaning: str
+    per: Literal["robot", "axis", "pose"]
+    """Whether it has one value, one for each axis, or x, y, z and a quaternion w, x, y, z."""
+    labels: dict[int, str] | None
+    """Names of its numbers, if it is a state or the like."""
+
+
+class Fields(_Answer):
+    """All quantities of a cycle."""
+
+    fields: list[Quantity]
+
+
+class Recording(_Answer):
+    """One file of a recording."""
+
+    name: str
+    session: str
+    part: int
+    """Number of the file in its session, from 1."""
+    begin: str
+    """Date and time of its first message, UTC."""
+    duration_s: float
+    bytes: int
+    live: bool
+    """Whether it is being written."""
+
+
+class Recordings(_Answer):
+    """The recordings of this robot, newest first."""
+
+    recordings: list[Recording]
+
+
+class Columns(_Answer):
+    """Curves of a recording."""
+
+    time_s: list[float]
+    """Time since the first cycle."""
+    columns: dict[str, list[float | None]]
+    """Values by name, such as `tension_N[left]`."""
+    cycles: int
+    """Number of cycles."""
+    each: int
+    """Number of cycles per pair of values, the smallest and the largest; 1 if all are there."""
+
+
+class StatusBit(_Answer):
+    """One bit of a statusword."""
+
+    bit: int
+    name: str
+    on: bool
+
+
+class Drive(_Answer):
+    """What one drive reports."""
+
+    name: str
+    bus: str
+    node_id: int
+    drive: str
+    """Its profile."""
+    state: str
+    """The statusword as text."""
+    bits: list[StatusBit]
+    mode: str
+    """The mode of operation in which it accepts torques."""
+
+
+class Bus(_Answer):
+    """One bus of the robot."""
+
+    name: str
+    load: float
+    """Share of a cycle that SYNC, PDOs and heartbeats need in the worst case."""
+    bitrate_bit_s: int
+
+
+class Drives(_Answer):
+    """The drives and buses of the robot."""
+
+    drives: list[Drive]
+    buses: list[Bus]
+
+
+class DriveObject(_Answer):
+    """Value of an object of a drive."""
+
+    name: str
+    """Its name in the electronic data sheet, "" if it has none."""
+    text: str
+    raw: str
+    """Its bytes in hexadecimal, the lowest first."""

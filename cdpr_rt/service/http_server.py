@@ -13,13 +13,14 @@ from typing import Any, Final
 import h11
 import uvicorn
 
-from cdpr_rt.service.access_control import MOST_BODY_BYTES, AccessControl
+from cdpr_rt.service.access_control import MOST_BODY_BYTES, PROGRESS, AccessControl
 
 MOST_IDLE_OF_PEER: Final = 32
 MOST_IDLE: Final = 256
 _LOOK_S: Final = 0.1
 IDLE_S, ANSWER_S, _CLOSE_S = 10.0, 90.0, 2.0
-"""Longest times for which a connection may send no request, not read its answer, or not end."""
+"""Longest times for which a connection may send no request, not read more of its answer, or not
+end."""
 _READ_S: Final = 0.5
 """A connection that is younger may have sent a request that has not been read yet."""
 _MOST_UNSENT_BYTES: Final = 1 << 20
@@ -129,4 +130,4 @@ def _phase(connection: Any) -> tuple[object, float]:
     cycle = connection.cycle
     if cycle is None or cycle.response_complete:
         return cycle, IDLE_S
-    return (cycle, "asking"), ANSWER_S
+    return (cycle, "asking", cycle.scope.get(PROGRESS)), ANSWER_S

@@ -329,7 +329,7 @@ class Recorder(Part):
         super().__init__("recorder", ended)
         self._block = block
         self._folder = folder
-        self._robot = re.sub(r"[^\w.-]", "_", robot)
+        self._robot = file_name_of(robot)
         self._most_bytes = most_bytes
         self._reserve_bytes = reserve_bytes
         self._retention = retention or Retention()
@@ -390,11 +390,16 @@ class Recorder(Part):
         self._remarks.append(({"text": text, **values}, time.monotonic_ns()))
 
     def status(self) -> dict[str, Any]:
-        """Return the status: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
+        """Return the status: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`.
+
+        `file_bytes` of the file are complete on the disk.
+        """
         file = self._file
+        path = self._path if file is None else file.path
         return {
             "recording": file is not None,
-            "file": str(self._path) if self._path else None,
+            "file": str(path) if path else None,
+            "file_bytes": file.size if file else 0,
             "rows": self._rows,
             "lost_rows": self._reader.lost,
             "bytes": self._bytes + (file.size if file else 0),
@@ -531,6 +536,11 @@ class Recorder(Part):
 
     def _log_event(self, event: dict[str, Any], stamp_ns: int) -> None:
         self._event.log(_text(event), log_time=self._wall(stamp_ns))
+
+
+def file_name_of(robot: str) -> str:
+    """Return how the names of a robot's recordings begin."""
+    return re.sub(r"[^\w.-]", "_", robot)
 
 
 def reserve_of(disk_bytes: int) -> int:

@@ -23,7 +23,7 @@ _CHUNK_BYTES: Final = 1 << 22
 """Largest chunk in a file with much data; readers keep a whole chunk in memory."""
 _DATA_END: Final = struct.pack("<BQI", 0x0F, 4, 0)
 _FOOTER_WITHOUT_SUMMARY: Final = struct.pack("<BQQQI", 0x02, 20, 0, 0, 0)
-_END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
+END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
 """End of a file without an index; readers then read the file from the beginning."""
 
 
@@ -114,7 +114,7 @@ class RecordingFile:
         """Write all data logged so far to the disk."""
         self._writer.flush()
         if self._held.data:
-            self._put(_END)
+            self._put(END)
 
     def close(self) -> None:
         """Write the index and close the file, once; nothing can be logged afterwards."""
@@ -132,7 +132,7 @@ class RecordingFile:
     def _put(self, end: bytes) -> None:
         data = bytes(self._held.data)
         self._held.data.clear()
-        held = len(_END) if self.size else 0
+        held = len(END) if self.size else 0
         text = data + end
         try:
             _write_safely(self._fd, text[held:], self.size + held)
@@ -147,8 +147,8 @@ class RecordingFile:
         """Restore the data of the last `sync`, and their end."""
         try:
             if self.size:
-                _write_all(self._fd, _END, self.size)
-                os.ftruncate(self._fd, self.size + len(_END))
+                _write_all(self._fd, END, self.size)
+                os.ftruncate(self._fd, self.size + len(END))
             else:
                 self.path.unlink(missing_ok=True)
         except OSError:

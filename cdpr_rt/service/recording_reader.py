@@ -70,6 +70,8 @@ _TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bo
 _ALWAYS: Final = ("time_s", "stamp_ns")
 
 _RECORD_HEAD, _MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
+_CHUNK_TIMES: Final = struct.Struct("<QQ")
+_MAGIC_BYTES: Final = 8
 _PLACES: Final = {name: k for k, name in enumerate(FIELDS)}
 
 CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
@@ -262,6 +264,28 @@ class RecordingReader:
                     f"{_MOST_EVENT_BYTES} bytes together"
                 )
             self.events.append({"log_time_ns": log_time_ns, **value, "text": str(value["text"])})
+
+
+def span_of(path: Path) -> tuple[int, int]:
+    """Return the time of day of the first and of the last message, ns; both 0 if there is none.
+
+    Only the heads of the chunks are read. Raises ProfileError for a file that cannot be read.
+    """
+    first_ns = last_ns = 0
+    with os.fdopen(open_regular(path, links=False), "rb") as file:
+        file.seek(_MAGIC_BYTES)
+        while len(head := file.read(_RECORD_HEAD.size)) == _RECORD_HEAD.size:
+            opcode, length = _RECORD_HEAD.unpack(head)
+            if opcode == Opcode.DATA_END:
+                break
+            if opcode == Opcode.CHUNK and len(times := file.read(_CHUNK_TIMES.size)) == 16:
+                begin_ns, end_ns = _CHUNK_TIMES.unpack(times)
+                first_ns, last_ns = first_ns or begin_ns, max(last_ns, end_ns)
+                length -= _CHUNK_TIMES.size
+            if length > 1 << 62:  # a damaged file
+                break
+            file.seek(length, os.SEEK_CUR)
+    return first_ns, last_ns
 
 
 def _records(chunk: Chunk) -> Iterator[Schema | Channel | tuple[int, int, bytes]]:

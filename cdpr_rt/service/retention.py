@@ -33,7 +33,7 @@ class Retention:
         longer than both `days` and 30 days counts as zero, so that the correction of a wrong clock
         removes nothing.
         """
-        found = sorted(_recordings(folder, robot), key=lambda one: one[1])
+        found = sorted(recordings_of(folder, robot), key=lambda one: one[1])
         total = sum(size for _, _, size in found)
         removed = []
         for (path, written_s, size), age_s in zip(found, self._ages(found), strict=True):
@@ -57,7 +57,8 @@ class Retention:
         return ages
 
 
-def _recordings(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
+def recordings_of(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
+    """Yield path, time of the last write and size of each recording of a robot; no links."""
     name = re.compile(re.escape(robot) + r"-\d{8}T\d{6}Z-\d{3,}\.mcap")
     for path in folder.glob("*.mcap"):
         if not name.fullmatch(path.name) or path.is_symlink():

@@ -7,10 +7,10 @@ import json
 import logging
 import tempfile
 import time
-from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from cdpr_profiles.errors import brief
 from cdpr_rt.core.shared_block import SharedBlock
@@ -21,6 +21,7 @@ from cdpr_rt.service.access_control import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
+from cdpr_rt.service.recording_folder import RecordingFolder
 from cdpr_rt.service.rows import cycle_figures, plain
 from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
 
@@ -110,13 +111,29 @@ WAIT_S: Final = {
     "acknowledge": 60.0,
     "shutdown": 30.0,
     "program": 15.0,
+    "object": 60.0,
 }
 """Timeouts of slow replies; all other replies come within a few cycles."""
 _WAIT_S = 3.0
+_CHANGING_S = 1.0
+"""A value that a client changed within this time may still be changing."""
 
 
 class InjectionError(ControlError):
     """A fault could not be injected into a simulated drive."""
+
+
+class DriveTexts(Protocol):
+    """Explains what drives report; the first call may take a second."""
+
+    def drives(self, statuswords: Sequence[int]) -> list[dict[str, Any]]:
+        """Return for each axis what its statusword means, as `models.Drive`."""
+
+    def buses(self) -> list[dict[str, Any]]:
+        """Return the planned load of each bus, as `models.Bus`."""
+
+    def object(self, axis: int, index: int, sub: int, data: bytes) -> dict[str, Any]:
+        """Return the meaning of an object's data, as `models.DriveObject`."""
 
 
 class Service:
@@ -150,8 +167,13 @@ class Service:
         self.inject: Callable[[int, str], str] | None = None
         """Function that breaks or mends a simulated axis and returns a description; None for real
         drives."""
+        self.recordings: RecordingFolder | None = None
+        """The robot's recordings, None if this daemon does not record."""
         self.stops = 0
         """Number of stops that came past `/control`; they cancel the orders that wait there."""
+        self.drives: DriveTexts | None = None
+        """Explains what drives report."""
+        self._sets: dict[tuple[Any, ...], tuple[float, str]] = {}
         self._held_by = ""
         self._noted: Reply | None = None
         self._stops_taken = int(self.link.status().get("stops", {}).get("taken", 0))
@@ -249,10 +271,29 @@ class Service:
         if reply is self._noted:
             return reply  # the command was shared by many clients
         self._noted = reply
-        if do != "set" or not reply.ok:
-            result = "" if reply.ok else f": refused: {reply.text}"
+        result = "" if reply.ok else f": refused: {reply.text}"
+        if do == "set" and reply.ok:
+            self._note_set(client, fields["wanted"])
+        elif do != "object":
             self.events.add("command", f"{do} by {client}{result}")
+        elif fields["value"] is not None:
+            what = "axis {axis}, {index:04X}h:{sub} to {value}".format(**fields)
+            self.events.add("command", f"object of {what} by {client}{result}")
         return reply
+
+    def _note_set(self, client: str, wanted: Mapping[str, Any]) -> None:
+        """Note which values a client has changed; an event follows when it changes no more."""
+        program = self.link.status().get("program")
+        values = ", ".join(f"{key} {value}" for key, value in wanted.items())
+        text = f"set {values} of {program} by {client}"
+        self._sets[client, program, *wanted] = time.monotonic(), text
+
+    def _note_sets(self) -> None:
+        now_s = time.monotonic()
+        for key, (changed_s, text) in list(self._sets.items()):
+            if now_s - changed_s > _CHANGING_S:
+                del self._sets[key]
+                self.events.add("set", text)
 
     # -- status
 
@@ -315,6 +356,7 @@ class Service:
         while True:
             self._note_holder()
             self._note_stop()
+            self._note_sets()
             self.block.counters["service_alive_ns"][0] = time.monotonic_ns()
             await asyncio.sleep(_TURN_S / 4)
 

@@ -14,12 +14,14 @@ from pydantic import Field, TypeAdapter, ValidationError
 from starlette.websockets import WebSocketDisconnect
 
 from cdpr_rt.core.cycle_row import FIELDS
+from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.right import LONGEST_S
 from cdpr_rt.service import http_models as models
 from cdpr_rt.service.access_control import TokenBuckets
 from cdpr_rt.service.lease import SHORTEST_S, LeaseError
 from cdpr_rt.service.link import Reply
+from cdpr_rt.service.recording import RowTexts
 from cdpr_rt.service.rows import newest_row, row_table
 from cdpr_rt.service.service import Service
 
@@ -213,6 +215,7 @@ async def _is_here() -> bool:
 FASTEST_HZ: Final = 50.0
 _MOST_LIVE = 16
 _STATUS_S = 1.0
+_MOST_CYCLES = 1000
 
 
 class WebSocketRoutes:
@@ -230,6 +233,7 @@ class WebSocketRoutes:
             socket: WebSocket,
             rate_Hz: Annotated[float, Query(gt=0.0, le=FASTEST_HZ)] = 10.0,
             fields: Annotated[str, Query(max_length=1000)] = "",
+            all_cycles: bool = False,
         ) -> None:
             wanted = tuple(name for name in fields.split(",") if name) or tuple(FIELDS)
             unknown = [name for name in wanted if name not in FIELDS]
@@ -239,7 +243,7 @@ class WebSocketRoutes:
             elif self._service.counts["live_clients"] >= _MOST_LIVE:
                 await socket.close(BUSY, f"{_MOST_LIVE} others are already watching")
             else:
-                await self._show(socket, rate_Hz, wanted)
+                await self._show(socket, rate_Hz, wanted, all_cycles)
 
         @app.websocket("/control")
         async def control(
@@ -257,13 +261,16 @@ class WebSocketRoutes:
 
     # -- viewers
 
-    async def _show(self, socket: WebSocket, rate_Hz: float, fields: tuple[str, ...]) -> None:
+    async def _show(
+        self, socket: WebSocket, rate_Hz: float, fields: tuple[str, ...], all_cycles: bool
+    ) -> None:
         updates = _Updates(self._service)
+        rows = _AllCycles(self._service.block, fields) if all_cycles else None
         async with self._viewing(socket) as gone:
             while not gone.done():
                 for message in updates.all():
                     await send(socket, json.dumps(message))
-                cycle = self._cycle(updates, fields)
+                cycle = self._cycle(updates, fields) if rows is None else rows.text()
                 if cycle:
                     await send(socket, cycle)
                 await asyncio.wait({gone}, timeout=1.0 / rate_Hz)
@@ -297,6 +304,23 @@ class WebSocketRoutes:
             table = {} if row is None else row_table(row, fields)
             self._cached = key, json.dumps(table)[1:]
         return f'{{"kind": "cycle", "skipped": {skipped}, {self._cached[1]}'
+
+
+class _AllCycles:
+    """All cycles not yet sent to one client, with numbers of states instead of their names."""
+
+    def __init__(self, block: SharedBlock, fields: tuple[str, ...]) -> None:
+        self._reader = RowReader(block)
+        self._texts = RowTexts(block.n, fields)
+        self._lost = 0
+
+    def text(self) -> str:
+        """Return the new cycles as a message, "" without any."""
+        texts = self._texts(self._reader.read(_MOST_CYCLES))
+        if not texts:
+            return ""
+        lost, self._lost = self._reader.lost - self._lost, self._reader.lost
+        return f'{{"kind": "cycles", "skipped": {lost}, "rows": [{b",".join(texts).decode()}]}}'
 
 
 class _Updates:

@@ -285,6 +285,10 @@ class AxisBuses:
         answers = {group: ask(group) for group in self.groups}
         return [answers[group][i] for group, i in map(self.group_of, range(self.n))]
 
+    def heartbeat_age_s(self) -> list[float]:
+        """Return the time since each drive's last heartbeat, counted in cycles."""
+        return self._by_axis(AxisGroup.heartbeat_age_s)
+
     # -- the end
 
     def close(self) -> str:

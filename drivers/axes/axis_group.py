@@ -484,6 +484,10 @@ class AxisGroup:
         self._faults_bits[:] = 0
         self.network.clear_alarm()
 
+    def heartbeat_age_s(self) -> list[float]:
+        """Return the time since each drive's last heartbeat, counted in cycles."""
+        return [int(age) * self.period_s for age in self._ints[codec.HEARTBEAT_AGE]]
+
     def set_extra_bits(self, axis: int, bits: int) -> None:
         """Add mode-specific bits to an enabled axis' controlword (start of homing, halt)."""
         self._ints[codec.EXTRA_BITS, axis] = bits

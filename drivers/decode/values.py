@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
@@ -283,6 +283,15 @@ _WORDS: dict[int, Callable[[int], str]] = {
 }
 
 _STATUS_BITS = ((7, "warning"), (10, "target reached"), (11, "internal limit"))
+
+
+STATUSWORD_BITS: Final = (
+    "ready to switch on", "switched on", "operation enabled", "fault", "voltage enabled",
+    "no quick stop", "switch on disabled", "warning", "manufacturer, bit 8", "remote",
+    "target reached", "internal limit", "mode, bit 12", "mode, bit 13", "manufacturer, bit 14",
+    "manufacturer, bit 15",
+)  # fmt: skip
+"""Meaning of each bit of a statusword that is set, from bit 0 (CiA 402-2)."""
 
 
 @lru_cache(maxsize=4096)

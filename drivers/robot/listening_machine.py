@@ -76,6 +76,18 @@ class ListeningMachine:
         """Return nothing: the drives are not queried."""
         return ()
 
+    def read_object(self, _axis: int, _index: int, _sub: int) -> bytes:
+        """Reject it: it would send."""
+        raise MachineError("this daemon only listens (--read-only)")
+
+    def write_object(self, _axis: int, _index: int, _sub: int, _value: int) -> None:
+        """Reject it: it would send."""
+        raise MachineError("this daemon only listens (--read-only)")
+
+    def heartbeat_age_s(self) -> list[float]:
+        """Return nothing: only whether heartbeats arrive in time is known."""
+        return []
+
     def close(self) -> str:
         """Leave the buses; return an empty text, because no drive's power is uncertain."""
         device, self.device = self.device, None

@@ -299,6 +299,18 @@ class RobotMachine:
         return found
 
     @_as_machine_error
+    def read_object(self, axis: int, index: int, sub: int) -> bytes:
+        """Return the data of an object of an axis' drive."""
+        of = self.robot.axes[axis]
+        return self.networks[of.bus].read_bytes(of.node_id, index, sub)
+
+    @_as_machine_error
+    def write_object(self, axis: int, index: int, sub: int, value: int) -> None:
+        """Write an integer object of an axis' drive."""
+        of = self.robot.axes[axis]
+        self.networks[of.bus].write(of.node_id, index, sub, value)
+
+    @_as_machine_error
     def close(self) -> str:
         """Switch the drives off and leave the buses; return what remains uncertain."""
         device, self.device = self.device, None
@@ -336,6 +348,10 @@ class RobotMachine:
             }
             for name, url in self._urls.items()
         }
+
+    def heartbeat_age_s(self) -> list[float]:
+        """Return the time since each drive's last heartbeat, counted in cycles."""
+        return [] if self.device is None else self.device.heartbeat_age_s()
 
     def simulated_status(self) -> dict[str, dict[str, Any]]:
         """Return the status of each simulated bus that is open, by its name."""

@@ -32,6 +32,7 @@ from cdpr_rt.service.http_server import Server
 from cdpr_rt.service.listening import listen_unix
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder
+from cdpr_rt.service.recording_folder import RecordingFolder
 from cdpr_rt.service.service import InjectionError, Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from cdpr_tools.daemon.child import (
@@ -41,6 +42,7 @@ from cdpr_tools.daemon.child import (
     loop_stop_s,
     signal_launcher,
 )
+from cdpr_tools.daemon.drive_texts import RobotDriveTexts
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, BadInputError, CommandError
 from cdpr_tools.streams import guard_streams, outlive_output
@@ -116,8 +118,12 @@ _PLANNING_S: Final = 600.0
 _NICER: Final = 10
 _LOG_FORMAT: Final = "service: %(message)s"
 _MOST_KiB: Final = 4 << 20
-"""Limit of the planning process' memory, so that a user's file cannot exhaust the machine's."""
+"""Limit of the memory of a process that plans or reads, so that a file cannot exhaust the
+machine's."""
 _WITHIN: Final = f'ulimit -v {_MOST_KiB} && exec nice -n{_NICER} "$@"'
+_READING: Final = (
+    "sh", "-c", _WITHIN, "sh", sys.executable, "-P", "-m", "cdpr_tools.recordings.reading_process",
+)  # fmt: skip
 
 
 class _PrintableFormatter(logging.Formatter):
@@ -150,6 +156,9 @@ def main() -> int:
         partial(keep_progress, folder, block.counters["path"], simulated=settings.simulated)
     )
     service.planner.work = partial(plan_in_process, settings.robot)
+    service.drives = RobotDriveTexts(settings.robot)
+    if settings.record is not None:
+        service.recordings = RecordingFolder(settings.record, settings.name, _READING)
     if settings.simulated:
         service.inject = partial(inject_fault, settings)
     try:

@@ -221,6 +221,11 @@ def export(selection: Selection, path: Path) -> int:
             return _write(selection, file, path.suffix)
 
 
+def write_csv(selection: Selection, file: IO[bytes]) -> int:
+    """Write the rows as CSV; return their number. Raises BadInputError if there are none."""
+    return _write(selection, file, ".csv")
+
+
 def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
     count, writer = 0, None
     try:
