@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -58,14 +59,13 @@ class Retention:
 
 
 def recordings_of(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
-    """Yield path, time of the last write and size of each recording of a robot; no links."""
+    """Yield path, time of the last write and size of each recording of a robot."""
     name = re.compile(re.escape(robot) + r"-\d{8}T\d{6}Z-\d{3,}\.mcap")
     for path in folder.glob("*.mcap"):
-        if not name.fullmatch(path.name) or path.is_symlink():
-            continue
         with suppress(OSError):
-            entry = path.stat()
-            yield path, entry.st_mtime, entry.st_size
+            entry = path.lstat()
+            if name.fullmatch(path.name) and stat.S_ISREG(entry.st_mode):
+                yield path, entry.st_mtime, entry.st_size
 
 
 def size_text(count: float) -> str:

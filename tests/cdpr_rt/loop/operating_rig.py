@@ -131,6 +131,9 @@ class Bench:
     def bus_state(self) -> dict[str, Any]:
         return {}
 
+    def heartbeat_age_s(self) -> list[float]:
+        return []
+
 
 class Rig:
     """An operator whose drives have power."""
