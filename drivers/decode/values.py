@@ -230,6 +230,8 @@ _FIXED: dict[int, tuple[float, str, int]] = {
     0x1017: (1.0, "ms", 0),
     0x6075: (_MILLI, "A", 3),
     0x6076: (_MILLI, "Nm", 3),
+    0x6073: (0.1, "% of rated current", 1),
+    0x6078: (0.1, "% of rated current", 1),
     0x6079: (_MILLI, "V", 3),
 }
 

@@ -5,6 +5,9 @@ import { Move, NextStep, PowerOff, RejectedMessage, Simulation, StopButton, useS
 import { linkTo, useView } from "./address";
 import { type Description, hasKey } from "./daemon";
 import { Axes, Events, Recording, RobotView, Tensions, Trends } from "./look";
+import { Drives } from "./drives";
+import { Recordings } from "./recordings";
+import { Scope } from "./scope";
 import { useStore } from "./store";
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
@@ -64,6 +67,9 @@ interface View {
 /** The page's views in the order of the navigation; the first is shown without a name in the address. */
 const VIEWS: View[] = [
   { name: "robot", title: "Robot", component: Robot },
+  { name: "scope", title: "Scope", component: Scope },
+  { name: "recordings", title: "Recordings", component: Recordings },
+  { name: "drives", title: "Drives and bus", component: Drives },
 ];
 
 function App() {

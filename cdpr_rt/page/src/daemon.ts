@@ -4,7 +4,12 @@ import type { components, paths } from "./api";
 
 export type Status = components["schemas"]["Status"];
 export type DaemonEvent = components["schemas"]["Event"];
-type Path = keyof paths;
+export type Quantity = components["schemas"]["Quantity"];
+export type RecordingFile = components["schemas"]["Recording"];
+export type Columns = components["schemas"]["Columns"];
+export type Drives = components["schemas"]["Drives"];
+export type DriveObject = components["schemas"]["DriveObject"];
+type Path = keyof paths | `/recordings/${string}`;
 
 /** A request that the daemon rejected, or that did not reach it. */
 export class Rejected extends Error {}
@@ -83,7 +88,7 @@ export async function request<T>(
   throw new Rejected(why);
 }
 
-async function socketTo(path: string, query: Record<string, string>): Promise<WebSocket> {
+export async function socketTo(path: string, query: Record<string, string>): Promise<WebSocket> {
   if (key) query["ticket"] = (await request<{ ticket: string }>("POST", "/ticket")).ticket;
   return new WebSocket(`ws://${location.host}${path}?${new URLSearchParams(query)}`);
 }
@@ -213,11 +218,26 @@ export class Right {
   }
 
   async program(program: string, wanted: Record<string, unknown> = {}): Promise<void> {
+    await this.#order({ do: "program", program, wanted });
+  }
+
+  /** Change arguments of the running program. */
+  async set(wanted: Record<string, unknown>): Promise<void> {
+    await this.#order({ do: "set", wanted });
+  }
+
+  /** Carry out a request that needs the right to move. */
+  async request<T>(path: Path, body: unknown): Promise<T> {
+    await this.#takeForStep();
+    return request<T>("POST", path, body, this.#token);
+  }
+
+  async #order(order: Record<string, unknown>): Promise<void> {
     await this.#takeForStep();
     const id = ++this.#number;
     const answer = await new Promise<{ ok: boolean; error: string | null }>((resolve) => {
       this.#waiting.set(id, resolve);
-      this.#socket?.send(JSON.stringify({ do: "program", program, wanted, id, client: clientName() }));
+      this.#socket?.send(JSON.stringify({ ...order, id, client: clientName() }));
     });
     if (!answer.ok) throw new Rejected(answer.error ?? "refused");
   }
@@ -244,3 +264,17 @@ export function clientName(): string {
 /** Commands that need no right to move. */
 export const command = (path: "/configure" | "/check" | "/acknowledge" | "/hold" | "/disable"): Promise<unknown> =>
   request("POST", path, { client: clientName() });
+
+/** Let the browser save a file of a recording; it arrives piece by piece. */
+export async function download(path: Path): Promise<void> {
+  const { ticket } = await request<{ ticket: string }>("POST", "/ticket");
+  saveAs(`${path}?ticket=${ticket}`, "");
+}
+
+/** Let the browser save what an address gives, with a name unless the daemon gives one. */
+export function saveAs(url: string, name: string): void {
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+}

@@ -1,5 +1,6 @@
 // What is only looked at: the robot, tensions, curves, events, axes.
 import { useEffect, useRef } from "preact/hooks";
+import { linkTo } from "./address";
 import { type Cycle, type Description } from "./daemon";
 import { RobotScene, tensionColour } from "./scene";
 import { progressOf } from "./situation";
@@ -181,7 +182,7 @@ export function Recording() {
   const text = !recording
     ? <>Nothing is recorded: the daemon was started with <code>--no-record</code>.</>
     : recording.recording
-      ? <>{recording.file?.split("/").pop()}, {((recording.bytes ?? 0) / 1e6).toFixed(1)} MB. <code>cdpr log plot</code> draws it.</>
+      ? <>{recording.file?.split("/").pop()}, {((recording.bytes ?? 0) / 1e6).toFixed(1)} MB. <a href={linkTo("recordings")}>Plot or download</a></>
       : <>Not recording: {recording.error || "ended"}</>;
   return (
     <section class="card" aria-labelledby="recording">
