@@ -37,7 +37,7 @@ class RecordingFolder:
 
     `command` is a command line that reads one of them: it is followed by the kind of the output
     (`csv`, `columns`, `picture`), the file, fields separated by commas or "", begin and end in s,
-    and the number of points. It writes the output, or why there is none to standard error.
+    and the number of points. It writes the output, or the reason of its failure to standard error.
     """
 
     def __init__(self, folder: Path, robot: str, command: Sequence[str]) -> None:

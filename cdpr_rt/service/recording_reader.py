@@ -267,7 +267,7 @@ class RecordingReader:
 
 
 def span_of(path: Path) -> tuple[int, int]:
-    """Return the time of day of the first and of the last message, ns; both 0 if there is none.
+    """Return the time of day of the first and of the last message, ns; both 0 without messages.
 
     Only the heads of the chunks are read. Raises ProfileError for a file that cannot be read.
     """

@@ -222,7 +222,7 @@ def export(selection: Selection, path: Path) -> int:
 
 
 def write_csv(selection: Selection, file: IO[bytes]) -> int:
-    """Write the rows as CSV; return their number. Raises BadInputError if there are none."""
+    """Write the rows as CSV; return their number. Raises BadInputError without rows."""
     return _write(selection, file, ".csv")
 
 
