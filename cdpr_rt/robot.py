@@ -618,8 +618,13 @@ class Robot:
         before, self._started = self._started, program
         try:
             self._backend.command("program", program, wanted)
-        except (Refused, InvalidArgument):
+        except (Refused, InvalidArgument) as refused:
             self._started = before
+            status = self._look()
+            if isinstance(refused, Refused) and status["reacting"] != "none":
+                error = self._fault(status)  # the robot is stopping
+                if isinstance(error, Faulted):
+                    raise error from None
             raise
         if program in _STANDING:
             self._started = ""

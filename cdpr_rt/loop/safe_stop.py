@@ -46,6 +46,7 @@ class SafeStop:
       it in place if cables are slack.
     - A drive lost, or a limit of `POSE_UNRELIABLE` exceeded: a platform is lowered without using
       its pose; axes without a platform make a quick stop.
+    - The code of a program fails: as with a known pose; if it fails again, without the pose.
     - A failure of any of these: quick stop.
     """
 
@@ -204,7 +205,10 @@ class SafeStop:
         if reaction is not Reaction.CONTROLLED_STOP or not self._engine.driving:
             return StopMethod.TORQUE_OFF
         failed = then is LoopState.FAULT and self._supervisor.limit in POSE_UNRELIABLE
-        if self._lowering is None or not failed:
+        # encoders and winches are right if only the code of a program has failed; a second
+        # failure, while the platform is being lowered by its pose, is not treated like this
+        only_code = self._engine.program_fault is not None and not self.reacts_to_fault
+        if self._lowering is None or not failed or only_code:
             return StopMethod.BRAKE
         return StopMethod.LOWER_WITHOUT_POSE if self.lowers else StopMethod.QUICK_STOP
 

@@ -82,8 +82,17 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) 
                 robot.move_to([0.2, 1.8], speed_m_s=0.1)
             assert fault.value.limit == "not_finite" and robot.state == "fault"
             assert mine.cycles == mine.fails_at  # the built-in controller has lowered the platform
+            home_m = robot.description["platform"]["home_m"]
+            assert robot.true_pose[:2] == pytest.approx(home_m, abs=0.01)  # not where it failed
             robot.acknowledge()
-            robot.inject_fault(0, "put-back")  # it was lowered where it was
+        mine.failing = None
+        robot.enable()
+        robot.tighten("home")
+        robot.move_to([0.2, 1.8])
+        mine.failing, mine.fails_at = division, mine.cycles + 1
+        with pytest.raises(cdpr.Faulted, match="no way on"):  # it has failed before the command
+            robot.move_to([0.0, 1.8])
+        assert robot.state == "fault"
 
 
 def test_a_controller_whose_reset_ends_the_process_stops_the_robot(planar_file: Path) -> None:
