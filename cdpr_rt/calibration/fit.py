@@ -139,7 +139,10 @@ def correlated(left: FloatArray, noise: FloatArray, yielding: float) -> FloatArr
 
 
 def feigned(hats: FloatArray, noise: FloatArray, information: float) -> float:
-    """Return the spurious information n, for hats (N, n, n) of lengths and `noise` S."""
+    """Return the spurious information n.
+
+    `hats` (N, n, n) are the hat matrices of lengths, `noise` is S.
+    """
     spare = np.eye(noise.shape[1]) - hats
     told = float((spare * noise).sum())
     return most_taken_out(max(told, 0.0), information)

@@ -133,8 +133,8 @@ def _unpacked(path: Path, packed: bytes) -> Iterator[bytes]:
             packed, unpacked = inflater.unconsumed_tail, unpacked + len(chunk)
             if unpacked > _MOST_CONTAINER:
                 raise BadInputError(
-                    f"{path}: container of more than {_MOST_CONTAINER} bytes, unpacked; allowed: "
-                    f"up to {_MOST_CONTAINER}"
+                    f"{path}: an unpacked container has more than {_MOST_CONTAINER} bytes, "
+                    "too many to read"
                 )
             yield chunk
 

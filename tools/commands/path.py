@@ -198,7 +198,7 @@ def resume(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Continue the path that was left, from where it was left."""
+    """Continue an interrupted path from where it stopped."""
     from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
     from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
 
@@ -218,7 +218,7 @@ def back(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Step back along the path that was left, and hold there."""
+    """Go back a step along an interrupted path, and hold there."""
     from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
     from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
 

@@ -54,7 +54,7 @@ def begin(settings: ExperimentSettings, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise BadInputError(
-                f"{folder}: is not empty; choose a new folder or one of an experiment"
+                f"{folder}: is not empty, and holds no experiment; choose a new folder"
             )
         path.write_text(to_json(asdict(settings), indent=1), encoding="utf-8")
 

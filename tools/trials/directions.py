@@ -102,7 +102,7 @@ class Directions:
         return np.asarray(Rotation.from_rotvec(vectors).as_matrix() @ self.home_rotation)
 
     def places(self, position_m: FloatArray, rotation: FloatArray) -> FloatArray:
-        """Return poses (m, 3), (m, 3, 3) as places, (m, d)."""
+        """Return places (m, d) from positions (m, 3) and rotation matrices (m, 3, 3)."""
         turned = self.turn_between(self.home_rotation, rotation) if self.turns else None
         angles = np.zeros((len(position_m), 0)) if turned is None else turned[:, self.about]
         return np.hstack([position_m[:, : self.k], angles])
