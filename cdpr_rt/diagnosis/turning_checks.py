@@ -16,7 +16,7 @@ from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.rigid_body import LEAST_ARM_m, in_space, is_point
 from cdpr_rt.model.robot_arrays import LEAST_REDUNDANCY
 from cdpr_rt.model.statics import NONE_rad, PlatformStatics
-from cdpr_rt.platform.loop_plant import weight_at, whole_stiffness
+from cdpr_rt.platform.loop_plant import swing_periods_s, weight_at, whole_stiffness
 
 _TURNED_rad = np.concatenate([[0.01, 0.02, 0.03], 0.04 * np.arange(1, 80)])
 """Angles of a platform that are tried; some cables touch only at small angles."""
@@ -225,6 +225,12 @@ def _hanging(
     computed = model.kinematics.hangs_freely
     apart_m *= not computed
     what, impossible = _in_words(places, x, apart_m, disagree_m, computed)
+    if computed and not impossible:
+        box = np.array([model.platform.workspace_min_m, model.platform.workspace_max_m])
+        k = int(np.linalg.norm(places - box.mean(axis=0), axis=1).argmin())
+        periods = swing_periods_s(model, Pose(poses[k, 0], poses[k, 1:]), J[k], t[k])
+        shown = " and ".join(f"{period:.2f}" for period in periods)
+        what += f"; with still motors it swings at {point_text(places[k])} m in {shown} s"
     return what + mend, impossible
 
 

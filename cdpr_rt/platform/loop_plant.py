@@ -98,6 +98,23 @@ def whole_stiffness(model: PlatformModel, pose: Pose, tension_N: FloatArray) -> 
     return np.asarray(0.5 * (K + K.T))
 
 
+def swing_periods_s(
+    model: PlatformModel, pose: Pose, jacobian: FloatArray, tension_N: FloatArray
+) -> FloatArray:
+    """Return the periods of the swings that leave all cable lengths unchanged, longest first.
+
+    With J (n, 6), motions are x = B y with J B = 0: B^T M B y'' + B^T K B y = 0. Unstable motions
+    are left out.
+    """
+    _, size, turned = np.linalg.svd(jacobian)
+    B = turned[np.count_nonzero(size > 1e-6 * size.max()) :].T
+    M, _ = _mass_matrix(model, pose)
+    root = np.linalg.inv(np.linalg.cholesky(B.T @ M @ B))
+    stiffness = B.T @ whole_stiffness(model, pose, tension_N) @ B
+    squares = np.linalg.eigvalsh(root @ stiffness @ root.T)
+    return np.asarray(2.0 * math.pi / np.sqrt(squares[squares > 0.0]))
+
+
 def linear_plant(
     model: PlatformModel,
     q: FloatArray,

@@ -84,7 +84,8 @@ def pose(
         typer.Argument(
             metavar="TABLE",
             help="CSV with the columns length_1_m, length_2_m, ... and, if measured, tension_1_N, "
-            "... at the winches, roll_rad and pitch_rad, and the pose: x_m y_m z_m, qw qx qy qz.",
+            "... at the winches, roll_rad and pitch_rad, time_s, and the pose: x_m y_m z_m, "
+            "qw qx qy qz.",
         ),
     ],
     poses: Annotated[
@@ -116,11 +117,19 @@ def pose(
     if rows:
         header = ["pose from", "error of", "mean", "rms", "largest"]
         out.say(TableText([header, *rows], left=("error of",)))
+    swing = pose_table.swing(given)
+    if swing:
+        out.say(
+            f"the platform swings by {swing['amplitude_deg']:.2f} deg with a period of "
+            f"{swing['period_s']:.2f} s; `cdpr robot show` predicts the period"
+        )
     if poses is not None:
         with os_error_as(BadInputError, str(poses)):
             pose_table.write_pose_table(poses, last)
         out.say(f"poses: {poses}")
-    out.result({"ok": not lost, "poses": len(last), "not_found": lost, "errors": figures})
+    out.result(
+        {"ok": not lost, "poses": len(last), "not_found": lost, "errors": figures, "swing": swing}
+    )
 
 
 @app.command("mark-calibrated")

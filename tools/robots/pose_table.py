@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -20,6 +21,12 @@ _MOST_BYTES: Final = 64 << 20
 POSITION: Final = ("x_m", "y_m", "z_m")
 QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _TILT: Final = ("roll_rad", "pitch_rad")
+_FEWEST: Final = 32
+_LEAST_PERIODS: Final = 3
+"""Least number of periods of a swing in a table."""
+_SLOWEST_Hz: Final = 0.1
+"""Frequency of a pendulum of 25 m."""
+_ABOVE: Final = 3.0
 
 
 @dataclass(frozen=True)
@@ -36,13 +43,15 @@ class PoseTable:
     """Measured positions, (m, 3)."""
     quaternion: FloatArray | None
     """Measured rotations, w x y z, (m, 4)."""
+    time_s: FloatArray | None
+    """(m, 1)"""
 
 
 def read_pose_table(path: Path, n: int) -> PoseTable:
     """Read a CSV table for a robot with n cables; raises BadInputError and ProfileError.
 
     Its columns are length_1_m to length_n_m, and if they were measured tension_1_N to tension_n_N,
-    roll_rad and pitch_rad, x_m y_m z_m, qw qx qy qz. Others are ignored.
+    roll_rad and pitch_rad, x_m y_m z_m, qw qx qy qz, time_s. Others are ignored.
     """
     lines = [row for row in csv.reader(io.StringIO(read_text(path, _MOST_BYTES))) if row]
     if len(lines) < 2:
@@ -75,7 +84,41 @@ def read_pose_table(path: Path, n: int) -> PoseTable:
     if lengths is None:
         raise BadInputError(f"{path}: columns length_1_m to length_{n}_m are missing")
     tensions, tilt = columns(*(f"tension_{i}_N" for i in each)), columns(*_TILT)
-    return PoseTable(lengths, tensions, tilt, columns(*POSITION), columns(*QUATERNION))
+    poses = columns(*POSITION), columns(*QUATERNION)
+    return PoseTable(lengths, tensions, tilt, *poses, columns("time_s"))
+
+
+def swing(table: PoseTable) -> dict[str, float]:
+    """Return amplitude and period of a swing that the inclinometer shows; empty for none.
+
+    The period is that of the strongest frequency in roll and pitch. It must stand out from its
+    neighbours, unlike those of other motions.
+    """
+    if table.time_s is None or table.tilt_rad is None or len(table.time_s) < _FEWEST:
+        return {}
+    time = table.time_s[:, 0]
+    step_s = float(np.median(np.diff(time)))
+    if not (np.diff(time) > 0.0).all():
+        return {}
+    grid = np.arange(time[0], time[-1], step_s)
+    tilt = np.column_stack([np.interp(grid, time, one) for one in table.tilt_rad.T])
+    tilt -= tilt.mean(axis=0)
+    window = np.hanning(grid.size)
+    power = (np.abs(np.fft.rfft(tilt * window[:, None], axis=0)) ** 2).sum(axis=1)
+    first = max(_LEAST_PERIODS, math.ceil(_SLOWEST_Hz * grid.size * step_s))
+    k = int(power.argmax())
+    if not first < k < power.size - 6:
+        return {}
+    near, beside = power[k - 2 : k + 3], (*power[max(k - 5, 0) : k - 2], *power[k + 3 : k + 6])
+    if not near.mean() > _ABOVE * max(beside):
+        return {}
+    peak = k + float(near @ np.arange(-2, near.size - 2)) / float(near.sum())
+    frequency_Hz = peak / (grid.size * step_s)
+    phase = 2.0 * np.pi * frequency_Hz * grid
+    waves = np.column_stack([np.cos(phase), np.sin(phase)])
+    found = np.linalg.lstsq(waves, tilt, rcond=None)[0]
+    amplitude = float(np.degrees(np.linalg.svd(found, compute_uv=False)[0]))
+    return {"amplitude_deg": amplitude, "period_s": 1.0 / frequency_Hz}
 
 
 def estimates(model: Model, table: PoseTable) -> dict[str, FloatArray]:

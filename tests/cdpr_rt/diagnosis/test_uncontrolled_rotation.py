@@ -14,6 +14,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.diagnosis.checks import diagnose
 from cdpr_rt.diagnosis.subject import Finding
+from cdpr_rt.model.rigid_body import inertia_kg_m2
 from cdpr_rt.model.statics import PlatformStatics, statics_of
 
 CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
@@ -169,6 +170,55 @@ def test_loads_beside_a_rod_or_below_a_knot_are_reported_as_swinging_but_accepte
         found = rotation_finding(tmp_path, text)
         assert found is not None and not found.impossible
         assert "the platform swings about these axes" in found.text
+
+
+def test_the_reported_periods_are_those_of_a_pendulum_on_cables_of_fixed_length(
+    tmp_path: Path,
+) -> None:
+    found = rotation_finding(tmp_path, hanging(0.05, 0.1))
+    assert found is not None
+    figures = re.search(r"it swings at \((.*), (.*), (.*)\) m in (\S+) and (\S+) s", found.text)
+    assert figures is not None, found.text
+    statics = statics_of(load_robot(tmp_path / "hanging.toml"))
+    platform = statics.platform
+    a, b = np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
+    place, centre = np.array([float(x) for x in figures.groups()[:3]]), platform.centre_of_mass_m
+
+    def lengths(x: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(x[:3] + Rotation.from_rotvec(x[3:]).apply(b) - a, axis=1)
+
+    before = lengths(np.array([*place, 0.0, 0.0, 0.0]))
+
+    def turned(tilt: np.ndarray) -> np.ndarray:
+        """Return the pose (6,) with these lengths at a tilt about x and y."""
+
+        def pose(rest: np.ndarray) -> np.ndarray:
+            return np.array([*rest[:3], *tilt, rest[3]])
+
+        at = root(lambda rest: lengths(pose(rest)) - before, np.array([*place, 0.0]), tol=1e-13)
+        return pose(at.x)
+
+    def energy(tilt: np.ndarray) -> float:
+        x = turned(tilt)
+        raised = x[2] + Rotation.from_rotvec(x[3:]).apply(centre)[2]
+        return float(platform.mass_kg * STANDARD_GRAVITY * raised)
+
+    h, axes = 0.02, np.eye(2)
+    K = np.array([
+        [
+            (energy(h * (p + q)) - energy(h * (p - q)) - energy(h * (q - p)) + energy(-h * (p + q)))
+            / (4.0 * h * h)
+            for q in axes
+        ]
+        for p in axes
+    ])  # fmt: skip
+    moves = np.column_stack([(turned(h * p) - turned(-h * p)) / (2.0 * h) for p in axes])
+    of_centre = moves[:3] + np.cross(moves[3:].T, centre).T
+    inertia = inertia_kg_m2(platform)
+    M = platform.mass_kg * of_centre.T @ of_centre + moves[3:].T @ inertia @ moves[3:]
+    squares = np.linalg.eigvals(np.linalg.solve(M, K)).real
+    periods = sorted(2.0 * np.pi / np.sqrt(squares), reverse=True)
+    assert periods == pytest.approx([float(one) for one in figures.groups()[3:]], rel=0.02)
 
 
 def test_a_box_below_the_home_of_a_hanging_platform_is_impossible(tmp_path: Path) -> None:

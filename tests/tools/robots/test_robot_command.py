@@ -18,6 +18,7 @@ from matplotlib.patches import Polygon
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
+from cdpr_rt import offline
 from cdpr_rt.diagnosis.checks import diagnose
 from cdpr_tools.robots.picture import figure_of
 
@@ -225,3 +226,26 @@ def test_colour_labels_of_a_thin_robot_do_not_overlap() -> None:
     extents = [text.get_window_extent() for text in bar.get_yticklabels() if text.get_text()]
     for below, above in pairwise(extents):
         assert below.y1 < above.y0
+
+
+@pytest.mark.parametrize("swings", [True, False])
+def test_a_swing_in_a_table_of_readings_is_reported(tmp_path: Path, swings: bool) -> None:
+    model = offline.load("planar-3")
+    lengths = model.lengths(model.home)
+    time, rng = np.arange(0.0, 12.0, 0.04), np.random.default_rng(4)
+    wave = np.sin(2.0 * np.pi * time / 1.31)
+    if not swings:
+        wave = np.cumsum(rng.normal(0.0, 0.1, time.size))
+    lines = ["time_s,length_1_m,length_2_m,length_3_m,roll_rad,pitch_rad"]
+    for t, one in zip(time, np.radians(3.0) * wave, strict=True):
+        roll, pitch = 0.6 * one + rng.normal(0.0, 1e-3), -0.8 * one + rng.normal(0.0, 1e-3)
+        lines.append(",".join(f"{x:.6f}" for x in (t, *lengths, roll, pitch)))
+    (tmp_path / "table.csv").write_text("\n".join(lines) + "\n")
+    ended = cdpr_here("robot", "pose", "planar-3", tmp_path / "table.csv", "--json")
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads(ended.stdout.splitlines()[-1])["swing"]
+    if swings:
+        assert found["amplitude_deg"] == pytest.approx(3.0, rel=0.05)
+        assert found["period_s"] == pytest.approx(1.31, rel=0.02)
+    else:
+        assert found == {}
