@@ -7,6 +7,7 @@ import json
 import re
 import signal
 import sys
+import threading
 from contextlib import suppress
 from typing import Annotated, Any, NoReturn
 
@@ -21,7 +22,12 @@ from cdpr_sim_bus.errors import BusSetupError, SimulatorError
 from cdpr_tools.command_group import ROBOT_VARIABLE, group_of
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, BadInputError, CommandError
-from cdpr_tools.streams import OutputLostError, guard_streams
+from cdpr_tools.streams import (
+    OutputLostError,
+    end_with_stdin,
+    guard_streams,
+    procedure_token,
+)
 
 MODULES = {
     "commission": {
@@ -243,6 +249,8 @@ def exit_status(error: BaseException) -> int:
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
     guard_streams()
+    if procedure_token is not None:
+        threading.Thread(target=end_with_stdin, daemon=True).start()
     announce_compiling()
     try:
         try:

@@ -29,7 +29,10 @@ from rich.text import Text
 from typing_extensions import override
 
 from cdpr_profiles.errors import printable
+from cdpr_tools.streams import procedure_token
 
+_PROGRESS_S: Final = 0.2
+"""Least time between two lines of a procedure's progress."""
 _SLOW_S = 2.0
 _ESTIMATED_FROM = 0.005
 """Share of the work after which the remaining time is shown."""
@@ -257,7 +260,7 @@ class Output:
 
         `quick` work is shown immediately only on a terminal, where it is erased at the end.
         """
-        if not quick and not self.notes.is_interactive:
+        if not quick and not self.notes.is_interactive and procedure_token is None:
             self.note(f"{what} ...")
         columns = (
             SpinnerColumn(),
@@ -284,6 +287,9 @@ class Output:
     def _shown(self, columns: Any, advance: Advance, shown: bool) -> Iterator[Advance]:
         if not shown:
             yield advance
+        elif procedure_token is not None:
+            with _written_as_json(advance):
+                yield advance
         elif self.notes.is_interactive:
             with Progress(*columns, console=self.notes, transient=True) as bar:
                 task = bar.add_task(advance.what, total=advance.total)
@@ -314,6 +320,25 @@ class Output:
         finally:
             over.set()
             teller.join()
+
+
+@contextmanager
+def _written_as_json(advance: Advance) -> Iterator[None]:
+    written_s = -math.inf
+
+    def write(share: float | None) -> None:
+        print(to_json({"progress": {"what": advance.what, "share": share}}), flush=True)
+
+    def write_now_and_then() -> None:
+        nonlocal written_s
+        if (now_s := time.monotonic()) - written_s >= _PROGRESS_S:
+            written_s = now_s
+            write(min(advance.done / advance.total, 1.0) if advance.total else None)
+
+    advance.on_change = write_now_and_then
+    write(0.0 if advance.total else None)
+    yield
+    write(1.0)
 
 
 class Advance:

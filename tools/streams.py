@@ -25,6 +25,22 @@ _ERROR: Final = 2
 _PATIENCE_S: Final = 0.2
 """Time that a daemon waits for a reader that reads nothing, such as a paused terminal."""
 
+PROCEDURE_VARIABLE: Final = "CDPR_PROCEDURE"
+"""Environment variable of a command that a daemon runs: the token of the right to move."""
+procedure_token: Final = os.environ.pop(PROCEDURE_VARIABLE, None)
+"""That token, None for all other commands; it is not passed on to this command's own children.
+
+A procedure ends with its standard input, and writes its progress as JSON to standard output.
+"""
+
+
+def end_with_stdin() -> None:
+    """End this process, as SIGTERM does, when standard input ends."""
+    with suppress(OSError, ValueError):
+        while os.read(sys.stdin.fileno(), 4096):
+            pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
 
 def discard_typed_ahead() -> None:
     """Discard what has been typed at the terminal before the question that is asked now."""

@@ -29,6 +29,9 @@ class LoopState(IntEnum):
 CUT_SHORT: Final = "the power was removed while the loop was ending"
 """Reason of a fault: a second request removed the power immediately while the loop ended."""
 
+EMERGENCY_STOP: Final = "emergency stop by cdpr estop"
+"""Reason of a fault, or of a loop whose drives a procedure runs, after `cdpr estop`."""
+
 
 class Transition(IntEnum):
     """Transition that an operator may command."""
@@ -38,6 +41,7 @@ class Transition(IntEnum):
     ENABLE = 2
     DISABLE = 3
     ACKNOWLEDGE = 4
+    RELEASE = 5
 
 
 ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
@@ -46,6 +50,7 @@ ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
     Transition.ENABLE: (LoopState.READY,),
     Transition.DISABLE: (LoopState.READY, LoopState.ACTIVE),
     Transition.ACKNOWLEDGE: (LoopState.FAULT,),
+    Transition.RELEASE: (LoopState.UNCONFIGURED, LoopState.INACTIVE, LoopState.READY),
 }
 """The states in which each transition is allowed; in all others it is rejected."""
 

@@ -7,6 +7,8 @@ were written remain.
 from __future__ import annotations
 
 import json
+import mmap
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final
@@ -105,6 +107,20 @@ def read_raw_log(path: Path) -> RawLog:
         data = read_bytes(path, _MOST_BYTES)
     except ProfileError as error:
         raise RawLogError(str(error)) from None
+    return _raw_log(path, data)
+
+
+def map_raw_log(path: Path) -> RawLog:
+    """Return a raw log that may still be written, without reading its rows into memory.
+
+    Raises RawLogError like `read_raw_log`, and OSError.
+    """
+    with path.open("rb") as file, suppress(ValueError):  # an empty file
+        return _raw_log(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+    raise RawLogError(f"{path}: contains no complete row of measurements")
+
+
+def _raw_log(path: Path, data: bytes | mmap.mmap) -> RawLog:
     try:
         header = parse_json(data[:_HEADER_BYTES], path)
         columns = header["columns"]

@@ -91,6 +91,7 @@ class CommandDispatcher:
             "enable": self._enable,
             "disable": self._disable,
             "acknowledge": self._acknowledge,
+            "release": self._release,
             "program": self._program,
             "set": self._set,
             "hold": self._hold,
@@ -252,6 +253,11 @@ class CommandDispatcher:
     def _acknowledge(self, _command: Command) -> Steps:
         self._require(Transition.ACKNOWLEDGE)
         return self._transitions.acknowledge()
+
+    def _release(self, _command: Command) -> Steps:
+        self._refuse_read_only("release")
+        self._require(Transition.RELEASE)
+        return self._transitions.release()
 
     def _enable(self, command: Command) -> Steps | None:
         self._refuse_read_only("enable")

@@ -13,7 +13,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
 from cdpr_rt.core.fault import PROGRAM, Fault, fault_record
 from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
-from cdpr_rt.core.states import CUT_SHORT, LoopState, Reaction
+from cdpr_rt.core.states import CUT_SHORT, EMERGENCY_STOP, LoopState, Reaction
 from cdpr_rt.loop.command_dispatcher import CommandDispatcher
 from cdpr_rt.loop.engine import TURN_S, Engine, LoopParts, TransitionRunner
 from cdpr_rt.loop.machine import Machine
@@ -174,7 +174,6 @@ class StatusPage:
         }
 
 
-EMERGENCY_STOP: Final = "emergency stop by cdpr estop"
 _NOT_LOWERED: Final = "; the platform was not lowered"
 
 
@@ -275,6 +274,10 @@ class ControlLoop:
 
     def _remove_power(self) -> None:
         life, state = self.life, self.life.state
+        if self.transitions.released:  # the service then ends the procedure
+            self._power_off_requested = False
+            life.set_reason(EMERGENCY_STOP)
+            return
         if state not in (LoopState.READY, LoopState.ACTIVE, LoopState.FAULT):
             return  # booting drives have no power; the request is latched later
         if state is LoopState.FAULT and self.runner.busy:

@@ -19,6 +19,7 @@ _ATTEMPTS: Final = 4
 _MODE_S: Final = 2.0
 _POWER_ON_S: Final = 4.0
 _FAULT_RESET_S: Final = 2.0
+RELEASED: Final = "a procedure runs the drives; the loop takes them again when it ends"
 
 
 class Transitions:
@@ -33,6 +34,8 @@ class Transitions:
         """Results of the last check of the bus."""
         self.first_program = HOLD
         """The program that runs once the drives are enabled."""
+        self.released = False
+        """Whether a procedure may run the drives."""
         self.ended = False
         """Whether the loop has been shut down."""
         self.power_off_unconfirmed = ""
@@ -49,6 +52,7 @@ class Transitions:
     def configure(self) -> Steps:
         """Boot the drives; the state is then inactive, or unconfigured if the boot fails."""
         life, machine, run_task = self._life, self._machine, self._runner.run_task
+        self.released = False
         self._engine.stop_cycles()
         if machine.device is not None:
             yield from run_task(machine.close)
@@ -60,6 +64,20 @@ class Transitions:
             life.set_reason(str(error))
             raise
         life.enter(LoopState.INACTIVE)
+
+    def release(self) -> Steps:
+        """Close the buses, so that another program can run the drives; they have no power."""
+        self._engine.stop_cycles()
+        unconfirmed: list[str] = []
+        if self._machine.device is not None:
+            close = self._machine.close
+            yield from self._runner.run_task(lambda: unconfirmed.append(close()))
+        self._life.enter(LoopState.UNCONFIGURED)
+        if any(unconfirmed):
+            self._life.set_reason(unconfirmed[0])
+            raise RefusedError(unconfirmed[0])
+        self.released = True
+        self._life.set_reason(RELEASED)
 
     # -- checking the bus
 

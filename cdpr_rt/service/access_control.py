@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from cdpr_profiles.bounded_input import is_mostly_text
 from cdpr_rt.loop.stop_socket import STOPS
-from cdpr_rt.service.page import PAGE_PREFIX
+from cdpr_rt.service.page import PAGE_PREFIX, REPORTS_PREFIX
 
 # A ticket replaces the key for opening one WebSocket or downloading one recording, because browsers
 # cannot send a header with these requests.
@@ -75,6 +75,7 @@ _MOST_PEERS: Final = 1024
 _MOST_FIELDS = 16
 STOP_PATHS: Final = frozenset(f"/{do}" for do in STOPS)
 _PUBLIC_PATHS = frozenset({"/", "/status", "/docs", "/openapi.json"})
+_PUBLIC_PREFIXES: Final = (PAGE_PREFIX, REPORTS_PREFIX)
 _LOCAL_PATHS: Final = frozenset({"/page-address"})
 _KEYLESS_STOPS = frozenset({("http", "POST", "/hold"), ("http", "POST", "/disable")})
 _LIVE_PATH = "/live"
@@ -292,7 +293,7 @@ class AccessControl:
         kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
         reads = kind == "http" and method in ("GET", "HEAD")
         if self._policy.key is not None and not self._policy.open_reading:
-            return reads and (path in _PUBLIC_PATHS or path.startswith(PAGE_PREFIX))
+            return reads and (path in _PUBLIC_PATHS or path.startswith(_PUBLIC_PREFIXES))
         looks_on = kind == "websocket" and path == _LIVE_PATH
         return reads or looks_on or (kind, method, path) in _KEYLESS_STOPS
 

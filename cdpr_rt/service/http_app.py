@@ -40,11 +40,17 @@ from cdpr_rt.service.link import (
     LoopGoneError,
     Reply,
 )
-from cdpr_rt.service.page import add_page
+from cdpr_rt.service.page import REPORT_HEADERS, REPORTS_PREFIX, add_page
+from cdpr_rt.service.procedure_runner import ProcedureError
 from cdpr_rt.service.recording_folder import RecordingsBusyError
 from cdpr_rt.service.recording_routes import add_recordings
 from cdpr_rt.service.rows import newest_row
-from cdpr_rt.service.service import InjectionError, PlannerBusyError, Service
+from cdpr_rt.service.service import (
+    DescribingError,
+    InjectionError,
+    PlannerBusyError,
+    Service,
+)
 from cdpr_rt.service.setpoint_stream import StreamError
 from cdpr_rt.service.websocket_routes import WebSocketRoutes
 
@@ -263,6 +269,8 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     StreamError: HTTPStatus.NOT_FOUND,
     InjectionError: HTTPStatus.CONFLICT,
     RecordingsBusyError: HTTPStatus.CONFLICT,
+    ProcedureError: HTTPStatus.CONFLICT,
+    DescribingError: HTTPStatus.CONFLICT,
 }
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
@@ -325,6 +333,8 @@ def create_app(service: Service) -> FastAPI:
     _add_drives(app, service)
     _add_simulation(app, service)
     add_recordings(app, service)
+    _add_procedures(app, service)
+    _add_describing(app, service)
     WebSocketRoutes(service).add(app)
     add_page(app)
     _add_key(app)
@@ -604,6 +614,56 @@ def _add_simulation(app: FastAPI, service: Service) -> None:
         text = await asyncio.to_thread(service.inject, body.axis, body.fault)
         service.events.add("simulation", f"{text} by {body.client}")
         return models.Injected(text=text)
+
+
+def _add_procedures(app: FastAPI, service: Service) -> None:
+    procedures = service.procedures
+
+    @app.post("/procedure", responses=_REFUSALS)
+    async def begin(body: models.ProcedureRequest, token: Token = None) -> models.ProcedureJob:
+        """Begin a procedure: commissioning or calibration; needs the right to move throughout."""
+        job = await procedures.begin(body, body.client, token)
+        return models.ProcedureJob.model_validate(job)
+
+    @app.get("/procedure")
+    async def present() -> models.ProcedureJob:
+        """The running procedure, or the last one."""
+        return models.ProcedureJob.model_validate(procedures.job())
+
+    @app.delete("/procedure")
+    async def cancel() -> models.ProcedureJob:
+        """End the procedure under control; a second request removes the power immediately."""
+        procedures.end("cancelled")
+        return models.ProcedureJob.model_validate(procedures.job())
+
+    @app.get("/procedure/curves")
+    async def curves() -> models.Curves:
+        """The newest part of the measurement that runs."""
+        found = await asyncio.to_thread(procedures.curves)
+        return models.Curves.model_validate(found)
+
+    @app.get(REPORTS_PREFIX + "{secret}/{name:path}", include_in_schema=False)
+    async def report(secret: str, name: str) -> Response:
+        found = await asyncio.to_thread(procedures.read, secret, name)
+        if found is None:
+            raise HTTPException(404)
+        content, kind = found
+        return Response(content, headers={**REPORT_HEADERS, "content-type": kind})
+
+
+def _add_describing(app: FastAPI, service: Service) -> None:
+    @app.post("/robot-file", responses=_REFUSALS)
+    async def describe(body: models.DescribeRobot) -> models.RobotDescription:
+        """Describe a robot by answers, or diagnose it; changes nothing."""
+        found = await service.describe(body.model_dump())
+        return models.RobotDescription.model_validate(found)
+
+    @app.put("/robot-file", responses=_REFUSALS)
+    async def save(body: models.SaveRobot) -> models.RobotSaved:
+        """Save a described robot as the user's own profile; needs consent to replace a file."""
+        saved = await service.describe(body.model_dump())
+        service.events.add("robot-file", f"{saved['file']} written by {body.client}")
+        return models.RobotSaved.model_validate(saved)
 
 
 def _add_path(app: FastAPI, service: Service) -> None:

@@ -185,6 +185,105 @@ class SimulatedFault(ClientRequest):
     ]
 
 
+_AxisName = Annotated[str, Field(min_length=1, max_length=64, description="Name of an axis.")]
+_Mass = Annotated[float, Field(ge=0.05, le=1000.0)]
+
+
+class Commission(ClientRequest):
+    """Identify motors, one after the other; each must be detached from its load."""
+
+    procedure: Literal["commission"]
+    axes: Annotated[list[_AxisName], Field(min_length=1, max_length=64)]
+    detached: Literal[True] = Field(description="The client confirms that the motors turn freely.")
+    quick: bool = False
+
+
+class CalibrateTension(ClientRequest):
+    """Identify the friction and the gain of a simulated winch from hung masses."""
+
+    procedure: Literal["tension"]
+    axis: _AxisName
+    masses_kg: Annotated[list[_Mass], Field(min_length=3, max_length=10)]
+
+
+class MeasurePoses(ClientRequest):
+    """Move the tight platform from home through poses and identify the geometry; adopt nothing."""
+
+    procedure: Literal["measure"]
+    poses: Annotated[
+        int | None, Field(ge=2, le=200, description="Number of poses; null: as many as help.")
+    ] = None
+    camera: bool = Field(default=False, description="Use the camera of the simulated platform.")
+
+
+class AdoptCalibration(ClientRequest):
+    """Adopt the geometry of the last measurement, from the next start on."""
+
+    procedure: Literal["adopt"]
+    measurement: Annotated[str, Field(pattern="^calibrate-[0-9]{8}-[0-9]{6}$")]
+    insignificant: bool = Field(
+        default=False, description="Adopt it even if its changes are not significant."
+    )
+
+
+class CheckCalibration(ClientRequest):
+    """Move the tight platform to ten poses and report whether the robot has changed."""
+
+    procedure: Literal["check"]
+
+
+class UndoCalibration(ClientRequest):
+    """Undo the calibration in force, from the next start on."""
+
+    procedure: Literal["undo"]
+
+
+class CalibrateLens(ClientRequest):
+    """Calibrate the lens of the simulated platform's camera with images of a board."""
+
+    procedure: Literal["lens"]
+    images: Annotated[int, Field(ge=5, le=100)] = 30
+
+
+ProcedureRequest = Annotated[
+    Commission
+    | CalibrateTension
+    | MeasurePoses
+    | AdoptCalibration
+    | CheckCalibration
+    | UndoCalibration
+    | CalibrateLens,
+    Field(discriminator="procedure"),
+]
+
+
+_Answers = Annotated[
+    dict[
+        Annotated[str, Field(pattern=_KEY)],
+        Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")],
+    ],
+    Field(max_length=80, description="Answers to the questions of `cdpr robot new`, by key."),
+]
+
+
+class DescribeRobot(_Body):
+    """A robot to describe; questions without an answer have their defaults."""
+
+    answers: _Answers = {}
+    present: bool = Field(default=False, description="Begin with the answers of this robot.")
+    diagnose: bool = Field(
+        default=False, description="Check the robot instead, which takes some seconds."
+    )
+
+
+class SaveRobot(ClientRequest):
+    """A described robot to save as the user's own profile."""
+
+    answers: _Answers
+    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9_-]{0,39}$")]
+    replace: bool = Field(default=False, description="Replace an existing file.")
+
+
 class Set(ClientRequest):
     """New arguments of the running program."""
 
@@ -252,6 +351,100 @@ class Planned(_Answer):
     """Why the robot cannot follow it, with the first place by line and coordinates."""
     plan: str | None
     """The name of the plan for the program `path`."""
+
+
+class ProcedureStep(_Answer):
+    """Progress of a part of a procedure."""
+
+    what: str
+    share: float | None
+    """From 0 to 1; null if its duration is not known."""
+
+
+class Report(_Answer):
+    """A report that can be read without the key, at a path that nobody can guess."""
+
+    title: str
+    path: str
+
+
+class ProcedureJob(_Answer):
+    """The procedure that runs, or the last one."""
+
+    number: int
+    """One more for each procedure; 0 before the first."""
+    procedure: str
+    """Its name in the request; empty before the first."""
+    what: str
+    client: str
+    running: bool
+    ending: str
+    """Why it ends or has ended early; empty if it does not."""
+    steps: list[ProcedureStep]
+    lines: list[str]
+    """The last lines that it has printed."""
+    error: str
+    """Why it failed; empty if it did not."""
+    result: dict[str, Any] | None
+    """The figures that it printed at its end."""
+    reports: list[Report]
+    values: dict[str, Any]
+    """Further facts, such as its folder."""
+    offers: dict[str, Any]
+    """Facts about the robot, such as `simulated_camera`."""
+
+
+class Curves(_Answer):
+    """The newest part of the present measurement; an empty list for each without one."""
+
+    name: str
+    time_s: list[float]
+    error_deg: list[float | None]
+    torque_Nm: list[float | None]
+
+
+class RobotQuestion(_Answer):
+    """A question about a robot, and its answer."""
+
+    key: str
+    text: str
+    value: str
+    default: str
+    origin: str
+    """Where the default comes from."""
+    problem: str
+    """What is wrong with the answer, so that the default is used; empty if it is valid."""
+    choices: list[str]
+    """The possible answers; empty if there are too many."""
+
+
+class RobotFinding(_Answer):
+    """What cannot work, or is doubtful, and the change to make."""
+
+    key: str
+    text: str
+    impossible: bool
+
+
+class RobotDescription(_Answer):
+    """A described robot; without `diagnose`, its questions and file, else what is wrong with it."""
+
+    questions: list[RobotQuestion] = []
+    toml: str = ""
+    platform: dict[str, Any] = {}
+    """As in the description of a running robot."""
+    notes: list[str] = []
+    """Properties of the present robot that the questions leave out."""
+    folder: str = ""
+    writable: bool = False
+    findings: list[RobotFinding] = []
+    figures: dict[str, float] = {}
+
+
+class RobotSaved(_Answer):
+    """The file that describes the robot."""
+
+    file: str
 
 
 class ControlTaken(_Answer):

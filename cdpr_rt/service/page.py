@@ -22,6 +22,16 @@ _KINDS: Final = {
     ".svg": "image/svg+xml",
     ".txt": "text/plain; charset=utf-8",
 }
+REPORTS_PREFIX: Final = "/reports/"
+"""Path of all reports; each is below a name that only clients with the key can learn."""
+REPORT_HEADERS: Final = {
+    "content-security-policy": (
+        "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; sandbox; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "referrer-policy": "no-referrer",
+}
+"""A report runs no scripts, and belongs to no origin."""
 _HEADERS: Final = {"content-security-policy": _POLICY, "referrer-policy": "no-referrer"}
 
 

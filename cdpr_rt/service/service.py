@@ -9,11 +9,13 @@ import tempfile
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from cdpr_profiles.errors import brief
 from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.states import EMERGENCY_STOP
 from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.loop.stop_socket import STOPS
@@ -21,6 +23,7 @@ from cdpr_rt.service.access_control import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
+from cdpr_rt.service.procedure_runner import ProcedureRunner
 from cdpr_rt.service.recording_folder import RecordingFolder
 from cdpr_rt.service.rows import cycle_figures, plain
 from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
@@ -106,6 +109,7 @@ _LOG = logging.getLogger("cdpr.service")
 WAIT_S: Final = {
     "configure": 60.0,
     "check": 30.0,
+    "release": 30.0,
     "enable": 30.0,
     "disable": 30.0,
     "acknowledge": 60.0,
@@ -117,6 +121,7 @@ WAIT_S: Final = {
 _WAIT_S = 3.0
 _CHANGING_S = 1.0
 """A value that a client changed within this time may still be changing."""
+_PROCEDURE_STOPS: Final = "the procedure stops under control"
 
 
 class InjectionError(ControlError):
@@ -136,6 +141,14 @@ class DriveTexts(Protocol):
         """Return the meaning of an object's data, as `models.DriveObject`."""
 
 
+class DescribingError(ControlError):
+    """A robot cannot be described or saved; the message gives the reason."""
+
+
+async def _describe_nothing(_request: dict[str, Any]) -> dict[str, Any]:
+    raise DescribingError("this daemon describes no robots")
+
+
 class Service:
     """One daemon's service: made once, used by all routes."""
 
@@ -150,6 +163,10 @@ class Service:
         self._unstarted: dict[str, str] = {}
         self.planner = PathPlanRunner()
         """Plans paths in a separate process."""
+        self.procedures = ProcedureRunner(
+            self.lease, lambda text: self.events.add("procedure", text), self._pass_buses
+        )
+        """Runs commissioning and calibration in a separate process."""
         self.stream: SetpointStream | None = None
         """The running set-point stream, None if none is received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
@@ -169,6 +186,8 @@ class Service:
         drives."""
         self.recordings: RecordingFolder | None = None
         """The robot's recordings, None if this daemon does not record."""
+        self.describe: Callable[[dict[str, Any]], Awaitable[dict[str, Any]]] = _describe_nothing
+        """Function that describes, diagnoses or saves a robot in a separate process."""
         self.stops = 0
         """Number of stops that came past `/control`; they cancel the orders that wait there."""
         self.drives: DriveTexts | None = None
@@ -261,13 +280,14 @@ class Service:
             self.end_daemon()
             self.wake_launcher()
             return Reply(True, self.link.ended_how, self.link.state())
-        if do in STOPS:
-            self.planner.cancel(f"{do} by {client}")
+        stopping = do in STOPS and self._cancel_work(f"{do} by {client}")
         try:
             reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
         finally:
             if do == "shutdown":  # the loop needs no launcher to stop
                 self.wake_launcher()
+        if stopping and not reply.ok:  # the loop moves nothing, but a procedure does
+            reply = replace(reply, ok=True, text=_PROCEDURE_STOPS, refusal=None)
         if reply is self._noted:
             return reply  # the command was shared by many clients
         self._noted = reply
@@ -294,6 +314,22 @@ class Service:
             if now_s - changed_s > _CHANGING_S:
                 del self._sets[key]
                 self.events.add("set", text)
+
+    def _cancel_work(self, why: str) -> bool:
+        """Cancel planning and end a procedure, because of a stop; return whether one runs."""
+        self.planner.cancel(why)
+        return self.procedures.end(why)
+
+    async def _pass_buses(self, take: bool) -> str:
+        """Let the loop take its buses or release them to a procedure; return why not, or ""."""
+        for do in ("configure", "check") if take else ("release",):
+            try:
+                reply = await self.link.command(do, WAIT_S[do], client="procedure")
+            except ControlError as error:
+                return f"{do}: {error}"
+            if not reply.ok:
+                return f"{do}: {reply.text}"
+        return ""
 
     # -- status
 
@@ -349,7 +385,9 @@ class Service:
     async def watch(self) -> None:
         """Follow the loop and the holder of the right to move, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            for work in (self.link.watch, self._watch_holder, *self.background):
+            for work in (
+                self.link.watch, self._watch_holder, self.procedures.watch, *self.background
+            ):  # fmt: skip
                 tasks.create_task(work())
 
     async def _watch_holder(self) -> None:
@@ -357,6 +395,7 @@ class Service:
             self._note_holder()
             self._note_stop()
             self._note_sets()
+            self._note_emergency()
             self.block.counters["service_alive_ns"][0] = time.monotonic_ns()
             await asyncio.sleep(_TURN_S / 4)
 
@@ -370,10 +409,19 @@ class Service:
         self._stops_taken = taken
         text = f"{stops['do']} by {stops['client']}"
         self.stops += 1
-        self.planner.cancel(text)
+        self._cancel_work(text)
         self.events.add("command", text)
         if stops["do"] == "shutdown":  # the loop needs no launcher to stop
             self.wake_launcher()
+
+    def _note_emergency(self) -> None:
+        """End a procedure that runs the loop's drives, if the loop has ended or must cut power."""
+        if not self.procedures.has_bus:
+            return
+        if self.link.dead:
+            self.procedures.cut(self.link.ended_how)
+        elif self.link.status().get("reason") == EMERGENCY_STOP:
+            self.procedures.cut(EMERGENCY_STOP)
 
     def _note_holder(self) -> None:
         holder = self.lease.holder()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image, open_camera
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets, MarkerSize
@@ -152,25 +153,32 @@ def camera_setup(
     """
     scene = CameraPlant() if plant is None else RobotPlant.load_file(plant).camera
     lens = CameraIntrinsics.load_file(intrinsics) if intrinsics else _by_board(out, scene)
-    sheets = MarkerSheets.load_file(markers) if markers else _ordered(scene)
+    sheets = MarkerSheets.load_file(markers) if markers else ordered_sheets(scene)
     return CameraSetup.of(lens, sheets)
 
 
-def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:
-    board = BoardPlant()
+def images_of_board(
+    out: Output, scene: CameraPlant, count: int = _BOARD_IMAGES
+) -> list[tuple[str, NDArray[np.uint8]]]:
+    """Return images, with names, that a simulated camera takes of a ChArUco board."""
     before_board = scene.model_copy(
         update={
-            "board": board, "grids": (), "markers": (), "occluders": (), "faults": (),
+            "board": BoardPlant(), "grids": (), "markers": (), "occluders": (), "faults": (),
             "mount": MountPlant(position_m=(0.0, 0.0, 0.0)),
         }
     )  # fmt: skip
     with out.stage("camera: starting the simulated camera"):
         camera = SimCamera(before_board)
     images = []
-    with out.progress("camera: images of a ChArUco board", float(_BOARD_IMAGES)) as advance:
-        for k, state in enumerate(random_poses(_BOARD_BOX, _BOARD_IMAGES, scene.seed)):
+    with out.progress("camera: images of a ChArUco board", float(count)) as advance:
+        for k, state in enumerate(random_poses(_BOARD_BOX, count, scene.seed)):
             images.append((f"board {k + 1}", camera.grab(state)))
             advance(k + 1.0)
+    return images
+
+
+def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:
+    board, images = BoardPlant(), images_of_board(out, scene)
     known = Board(board.columns, board.rows, board.square_m, board.marker_m, board.dictionary)
     with out.stage("camera: calibrating its lens with these images"):
         found = fit_intrinsics(images, known)
@@ -183,7 +191,7 @@ def _by_board(out: Output, scene: CameraPlant) -> CameraIntrinsics:
     return one
 
 
-def _ordered(scene: CameraPlant) -> MarkerSheets:
+def ordered_sheets(scene: CameraPlant) -> MarkerSheets:
     """Return the sheets as ordered: their positions and printed sizes are not known."""
     grids = scene.grids or (() if scene.markers else DEFAULT_SCENE)
     sizes = [

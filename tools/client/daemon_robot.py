@@ -54,6 +54,7 @@ from cdpr_tools.composition.fault_injection import fault_access
 from cdpr_tools.errors import BAD_INPUT, BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.processes import module_command
+from cdpr_tools.streams import procedure_token
 
 _WITH_RIGHT: Final = frozenset({"enable", "program", "set"})
 """Commands that need the right to move."""
@@ -224,6 +225,8 @@ class _Remote:
         self._file, self._lockstep = _recorded_file(status), bool(status["lockstep"])
         self._lock = threading.Lock()
         self._token: str | None = None
+        self._given = procedure_token
+        """Token of the client for which a daemon runs this command; only that client renews it."""
         self._closed = threading.Event()
         self._renewer = threading.Thread(
             target=_keep_right, args=(weakref.ref(self), self._closed), daemon=True
@@ -245,6 +248,8 @@ class _Remote:
 
     def take_right(self) -> str:
         """Take the right to move unless it is held; return its token."""
+        if self._given is not None:
+            return self._given
         with self._errors(), self._lock:
             if self._token is None:
                 asked = {"ttl_s": _TTL_S}
@@ -415,10 +420,17 @@ class _Remote:
 
     def close(self) -> None:
         with self.opened:
-            if not self._closed.is_set() and self._token is not None:
-                with suppress(CommandError):
-                    self._daemon.post("/hold")
+            with suppress(CommandError):
+                self._hold()
             self.release()
+
+    def _hold(self) -> None:
+        if self._closed.is_set():
+            return
+        if self._given is not None:  # a stop would also end this procedure
+            self._daemon.post("/program", {"program": "hold"}, self._given)
+        elif self._token is not None:
+            self._daemon.post("/hold")
 
     def release(self) -> None:
         """Release the right to move; programs that do not need it continue. Idempotent."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from cdpr_drivers.camera.camera import Camera, open_camera
 from cdpr_rt.calibration.markers.detection import Board, IntrinsicsFit, fit_intrinsics
 from cdpr_rt.core.clock import PacedClock
-from cdpr_tools.commands.options import JsonOption, OverwriteOption
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption
+from cdpr_tools.errors import WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import require_free, save
 
@@ -79,6 +79,7 @@ def calibrate(
     count: Annotated[
         int, typer.Option(min=5, max=500, help="Images to take with a camera, one per second.")
     ] = 30,
+    png: PngOption = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -93,8 +94,14 @@ def calibrate(
         live = not url.startswith("folder:")
         most = count if live else None
         _collect(source, images, most, out)
-    fit = fit_intrinsics(images, board)
+    with out.stage("fitting the lens"):
+        fit = fit_intrinsics(images, board)
     _tell(out, fit)
+    if png is not None:
+        from cdpr_tools.calibrate.lens_picture import draw_lens  # noqa: PLC0415  # slow to load
+
+        with os_error_as(WorkFailedError, f"{png}: cannot be written"):
+            draw_lens(png, fit, images)
     save(target, fit.intrinsics.toml_text())
     out.say(f"intrinsics: {target}")
     one = fit.intrinsics

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import signal
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -65,7 +64,7 @@ from cdpr_tools.errors import (
 )
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.robots.calibration_text import calibration_text
-from cdpr_tools.streams import outlive_output
+from cdpr_tools.streams import end_with_stdin, outlive_output
 
 _KEPT_DAYS, _KEPT_GB = 30.0, 20.0
 _RING_S = 15.0  # longer than it takes to detect a hanging service and restart it
@@ -179,13 +178,13 @@ def run(
     """
     out = Output(as_json)
     if exit_with_stdin:
-        threading.Thread(target=_end_with_stdin, daemon=True).start()
+        threading.Thread(target=end_with_stdin, daemon=True).start()
     if find_spec("uvicorn") is None:  # report this before a child process fails without it
         raise ModuleNotFoundError(name="uvicorn")
     profile = load_calibrated(robot)
     refuse_simulated_calibration(profile, bus or ())
     settings = settings_for(
-        profile, bus=bus, plant=plant, http=http, no_page=no_page, unix=unix,
+        profile, bus=bus, plant=plant, camera=camera, http=http, no_page=no_page, unix=unix,
         key_file=key_file, record=record, no_record=no_record, keep_days=keep_days, keep_gb=keep_gb,
         live=live, live_origin=live_origin, stream=stream, no_stream=no_stream,
         read_only=read_only, safety_io=safety_io, tension_port=tension_port,
@@ -195,8 +194,6 @@ def run(
     )  # fmt: skip
     if open_it and settings.http is None:
         raise BadInputError("--open and --no-page: give only one of them")
-    if camera is not None and not starts_own_simulator(bus or ()):
-        raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_possible(settings.socket)
     with ExitStack() as stack:
         # hold the lock from before anything starts until everything has ended
@@ -222,14 +219,6 @@ def run(
             simulator = _simulator(profile, settings, plant, camera, out, lock.tell)
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator, open_it=open_it)
-
-
-def _end_with_stdin() -> None:
-    """End this process, as SIGTERM does, when standard input ends."""
-    with suppress(OSError, ValueError):
-        while os.read(sys.stdin.fileno(), 4096):
-            pass
-    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _simulator(
@@ -283,6 +272,7 @@ def settings_for(
     *,
     bus: list[str] | None,
     plant: Path | None,
+    camera: Path | None = None,
     http: str | None,
     no_page: bool = False,
     unix: Path | None,
@@ -318,6 +308,8 @@ def settings_for(
     own_simulator = starts_own_simulator(bus or ())
     if plant is not None and not own_simulator:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    if camera is not None and not own_simulator:
+        raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     if read_only and own_simulator:
         raise BadInputError(
             "--read-only: a simulator that the command starts has no other master; give "
@@ -330,6 +322,8 @@ def settings_for(
         simulated=own_simulator
         or all(url.is_simulated for url in robot_urls(robot, tuple(bus or ())).values()),
         own_simulator=own_simulator,
+        plant=plant,
+        camera=camera,
         read_only=read_only,
         safety_io=safety_io,
         tension_port=tension_port,

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import cv2
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from cdpr_profiles.camera import CameraIntrinsics
 from cdpr_sim_bus.camera.camera_server import CameraServer
 from cdpr_sim_bus.camera.sim_camera import Box, SimCamera, random_poses
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.camera_plant import CameraPlant
+from cdpr_tools.calibrate.pose_camera import images_of_board, ordered_sheets
 from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, SeedOption
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers
@@ -63,14 +67,18 @@ def photos(
         str, typer.Option(help="Highest position of the platform, m.", metavar='"X Y Z"')
     ] = "0.2 0.6 1.75",
     tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
+    board: Annotated[
+        bool, typer.Option("--board", help="Show a ChArUco board from near, for its lens.")
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace files that are already in FOLDER.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write images of a simulated camera from random poses, and its intrinsics.
+    """Write images of a simulated camera from random poses, its intrinsics and its marker sheets.
 
-    The true intrinsics are written to camera.toml beside the images.
+    The true intrinsics are written to camera.toml beside the images, and the sheets as they were
+    ordered from the printer to markers.toml.
     """
     out = Output(as_json)
     truth = CameraPlant.load_file(plant)
@@ -81,14 +89,20 @@ def photos(
     box = Box((x_low, y_low, z_low), (x, y, z), tilt_deg)
     require_free("FOLDER", folder, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
-    made, lens = SimCamera(truth), truth.lens
+    lens = truth.lens
+    if board:
+        images: Iterable[NDArray[np.uint8]] = (one for _, one in images_of_board(out, truth, count))
+    else:
+        made = SimCamera(truth)
+        images = (made.grab(state) for state in random_poses(box, count, seed))
     with out.progress(f"{count} images", float(count)) as advance:
-        for k, state in enumerate(random_poses(box, count, seed)):
+        for k, pixels in enumerate(images):
             path = folder / f"image-{k:04d}.png"
-            if not cv2.imwrite(str(path), made.grab(state)):
+            if not cv2.imwrite(str(path), pixels):
                 raise BadInputError(f"{path}: cannot be written")
             advance(k + 1.0)
     intrinsics = CameraIntrinsics.model_validate(lens, from_attributes=True)
     save(folder / "camera.toml", intrinsics.toml_text())
-    out.say(f"{count} images and camera.toml in {folder}")
+    save(folder / "markers.toml", ordered_sheets(truth).toml_text())
+    out.say(f"{count} images, camera.toml and markers.toml in {folder}")
     out.result({"ok": True, "folder": folder, "images": count})

@@ -43,6 +43,8 @@ from cdpr_tools.daemon.child import (
     signal_launcher,
 )
 from cdpr_tools.daemon.drive_texts import RobotDriveTexts
+from cdpr_tools.daemon.procedures import planned
+from cdpr_tools.daemon.robot_describer import WITHIN, RobotDescriber
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, BadInputError, CommandError
 from cdpr_tools.streams import guard_streams, outlive_output
@@ -115,14 +117,9 @@ _TOLD_S: Final = 0.6
 _MOST_FILES = 4096
 _SWITCH_S = 5e-4
 _PLANNING_S: Final = 600.0
-_NICER: Final = 10
 _LOG_FORMAT: Final = "service: %(message)s"
-_MOST_KiB: Final = 4 << 20
-"""Limit of the memory of a process that plans or reads, so that a file cannot exhaust the
-machine's."""
-_WITHIN: Final = f'ulimit -v {_MOST_KiB} && exec nice -n{_NICER} "$@"'
 _READING: Final = (
-    "sh", "-c", _WITHIN, "sh", sys.executable, "-P", "-m", "cdpr_tools.recordings.reading_process",
+    "sh", "-c", WITHIN, "sh", sys.executable, "-P", "-m", "cdpr_tools.recordings.reading_process",
 )  # fmt: skip
 
 
@@ -159,6 +156,11 @@ def main() -> int:
     service.drives = RobotDriveTexts(settings.robot)
     if settings.record is not None:
         service.recordings = RecordingFolder(settings.record, settings.name, _READING)
+    service.procedures.plan = partial(planned, settings)
+    service.procedures.offers = {"simulated_camera": settings.camera is not None}
+    describer = RobotDescriber(settings.robot)
+    service.describe = describer.answer
+    service.background.append(describer.watch)
     if settings.simulated:
         service.inject = partial(inject_fault, settings)
     try:
@@ -301,7 +303,7 @@ async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tu
     ]
     command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", "show", str(file)]
     process = await asyncio.create_subprocess_exec(
-        "sh", "-c", _WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,
+        "sh", "-c", WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip

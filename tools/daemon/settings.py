@@ -108,6 +108,10 @@ class RunSettings(BaseModel):
     """Whether all buses are simulated; files that such a robot leaves are kept separately."""
     own_simulator: bool = False
     """Whether the drives belong to a simulator that starts and ends with this daemon."""
+    plant: _Path | None = None
+    """Plant file of that simulator."""
+    camera: _Path | None = None
+    """Socket of its simulated camera."""
     read_only: bool = False
     commissioned: _Path | None = None
     """Folder with the cogging profiles of the axes' motors."""

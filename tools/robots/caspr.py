@@ -63,7 +63,8 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
     for name, points in (("exit", exits), ("anchor", anchors)):
         for number, point in enumerate(points, start=1):
             answers[f"{name}_{number}_m"] = ", ".join(f"{x:.6g}" for x in point[:size])
-    return {"kind": _kind(np.array(exits)[:, :size], np.array(anchors), cables), **answers}
+    kind = kind_of_points(np.array(exits)[:, :size], np.array(anchors), cables)
+    return {"kind": kind, **answers}
 
 
 class ModelAnswers:
@@ -86,7 +87,7 @@ class ModelAnswers:
         return default.text if text is None or problem else text
 
 
-def _kind(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
+def kind_of_points(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
     """Return the kind of `KINDS` with this number of cables; raises BadInputError for others."""
     count, size = exits_m.shape
     heights = exits_m[:, -1]

@@ -350,6 +350,10 @@ class IntrinsicsFit:
     """Images that were left out, with reasons."""
     missing: tuple[str, ...]
     """Missing views, as text; empty if the intrinsics are good."""
+    corners_px: tuple[FloatArray, ...]
+    """Detected corners of each used image, (k, 2)."""
+    residuals_px: tuple[FloatArray, ...]
+    """Detected minus computed corners, (k, 2)."""
 
 
 def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> IntrinsicsFit:
@@ -391,7 +395,20 @@ def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board
         sigmas=tuple(float(one) for one in sigmas.ravel()[:9]),
     )
     missing = _missing(views, turns, shifts, intrinsics)
-    return IntrinsicsFit(intrinsics, tuple(v[0] for v in views), tuple(left_out), tuple(missing))
+    seen = tuple(view[2].reshape(-1, 2) for view in views)
+    project: Any = cv2.projectPoints
+    computed = [
+        project(view[1], turn, shift, matrix, distortion)[0].reshape(-1, 2)
+        for view, turn, shift in zip(views, turns, shifts, strict=True)
+    ]
+    return IntrinsicsFit(
+        intrinsics,
+        tuple(view[0] for view in views),
+        tuple(left_out),
+        tuple(missing),
+        seen,
+        tuple(one - other for one, other in zip(seen, computed, strict=True)),
+    )
 
 
 _View = tuple[str, FloatArray, FloatArray]

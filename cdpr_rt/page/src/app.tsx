@@ -3,7 +3,10 @@ import { type ComponentType, render } from "preact";
 import { useEffect } from "preact/hooks";
 import { Move, NextStep, PowerOff, RejectedMessage, Simulation, StopButton, useSituation } from "./act";
 import { linkTo, useView } from "./address";
+import { Calibrate } from "./calibrate";
+import { Commission } from "./commission";
 import { type Description, hasKey } from "./daemon";
+import { Describe } from "./describe";
 import { Axes, Events, Recording, RobotView, Tensions, Trends } from "./look";
 import { Drives } from "./drives";
 import { Recordings } from "./recordings";
@@ -70,6 +73,9 @@ const VIEWS: View[] = [
   { name: "scope", title: "Scope", component: Scope },
   { name: "recordings", title: "Recordings", component: Recordings },
   { name: "drives", title: "Drives and bus", component: Drives },
+  { name: "commission", title: "Commission", component: Commission },
+  { name: "calibrate", title: "Calibrate", component: Calibrate },
+  { name: "describe", title: "Describe", component: Describe },
 ];
 
 function App() {

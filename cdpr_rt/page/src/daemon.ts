@@ -3,6 +3,11 @@ import { keepKey, takeKey } from "./address";
 import type { components, paths } from "./api";
 
 export type Status = components["schemas"]["Status"];
+export type Job = components["schemas"]["ProcedureJob"];
+export type Curves = components["schemas"]["Curves"];
+export type ProcedureRequest = NonNullable<paths["/procedure"]["post"]["requestBody"]>["content"]["application/json"];
+/** A procedure's values, without the name of the client. */
+export type Wanted = ProcedureRequest extends infer One ? (One extends unknown ? Omit<One, "client"> : never) : never;
 export type DaemonEvent = components["schemas"]["Event"];
 export type Quantity = components["schemas"]["Quantity"];
 export type RecordingFile = components["schemas"]["Recording"];
@@ -240,6 +245,12 @@ export class Right {
       this.#socket?.send(JSON.stringify({ ...order, id, client: clientName() }));
     });
     if (!answer.ok) throw new Rejected(answer.error ?? "refused");
+  }
+
+  /** Begin a procedure, which ends if this page loses the right to move. */
+  async procedure(wanted: Wanted): Promise<Job> {
+    await this.#takeForStep();
+    return request<Job>("POST", "/procedure", { client: clientName(), ...wanted }, this.#token);
   }
 
   #forget(why: string): void {

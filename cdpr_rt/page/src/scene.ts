@@ -1,8 +1,8 @@
 // The robot in three dimensions: frame, cables coloured by tension, platform, box of targets, target.
 import {
-  BoxGeometry, BufferGeometry, Color, CylinderGeometry, EdgesGeometry, GridHelper, Group,
+  BoxGeometry, BufferGeometry, CanvasTexture, Color, CylinderGeometry, EdgesGeometry, GridHelper, Group,
   HemisphereLight, DirectionalLight, LineBasicMaterial, LineDashedMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene, SphereGeometry, Vector3,
+  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene, SphereGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3,
   WebGLRenderer, Box3,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -40,6 +40,28 @@ function outline(size: Vector3, centre: Vector3, material: LineBasicMaterial): L
   return lines;
 }
 
+/** Return a number on a disc that faces the viewer. */
+function label(text: string, place: Vector3, size: number): Sprite {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 64;
+  const pen = canvas.getContext("2d")!;
+  pen.fillStyle = "#1f4f80";
+  pen.arc(32, 32, 30, 0, 2 * Math.PI);
+  pen.fill();
+  pen.fillStyle = "#ffffff";
+  pen.font = "600 38px system-ui, sans-serif";
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  pen.fillText(text, 32, 34);
+  const map = new CanvasTexture(canvas);
+  map.colorSpace = SRGBColorSpace;
+  const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false }));
+  sprite.position.copy(place);
+  sprite.scale.setScalar(size);
+  sprite.renderOrder = 1;
+  return sprite;
+}
+
 export class RobotScene {
   #renderer: WebGLRenderer;
   #scene = new Scene();
@@ -52,6 +74,8 @@ export class RobotScene {
   #exits: Vector3[] = [];
   #description: Description | null = null;
   #block = new MeshStandardMaterial({ color: "#ffb454", transparent: true, opacity: UNSURE, roughness: 0.6 });
+  /** Whether exit points and anchor points have the numbers of their cables. */
+  numbered = false;
   #asked = false;
   #again = false;
   #shown = "";
@@ -91,6 +115,7 @@ export class RobotScene {
     this.#room.rotation.x = planar ? 0 : -Math.PI / 2;
     const exits = platform.exit_points_m.map(at);
     const points = new BufferGeometry().setFromPoints(exits);
+    if (this.numbered) this.#addNumbers(exits, platform.anchor_points_m.map(at));
     this.#room.add(new Points(points, new PointsMaterial({ color: "#7a8797", size: 9, sizeAttenuation: false })));
     this.#addTargets(platform);
     this.#addPlatform(platform);
@@ -132,6 +157,18 @@ export class RobotScene {
       this.#place(this.#ghost, at(target_m), turned);
     }
     this.#draw();
+  }
+
+  /** Number the ends of the cables, from 1; a number of an anchor point is smaller. */
+  #addNumbers(exits: Vector3[], anchors: Vector3[]): void {
+    const reach = new Box3().setFromPoints(exits).getSize(new Vector3()).length();
+    exits.forEach((one, number) => this.#room.add(label(String(number + 1), one, reach / 18)));
+    const beside = anchors.map((one, number) => anchors.slice(0, number).filter((other) => other.distanceTo(one) < 1e-6).length);
+    anchors.forEach((one, number) => {
+      const sprite = label(String(number + 1), one, reach / 30);
+      sprite.center.set(0.5 - 0.8 * beside[number]!, 0.5); // numbers of cables that end in one point stand side by side
+      this.#platform.add(sprite);
+    });
   }
 
   #addTargets(platform: Platform): void {

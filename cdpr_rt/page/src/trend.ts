@@ -13,6 +13,9 @@ export interface Curve {
 
 const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
+/** How the axes of all plots look. */
+export const axisStyle = () => ({ stroke: () => css("--muted"), grid: { stroke: () => css("--line") }, ticks: { show: false }, font: "11px system-ui" });
+
 /** A plot against bus time that keeps `SPAN_S`; older points leave it. */
 export class Trend {
   #plot: uPlot;
@@ -22,7 +25,7 @@ export class Trend {
   /** `floor`: the vertical axis ends there or higher. */
   constructor(host: HTMLElement, curves: Curve[], floor: number) {
     this.#data = [[], ...curves.map(() => [])];
-    const axis = { stroke: () => css("--muted"), grid: { stroke: () => css("--line") }, ticks: { show: false }, font: "11px system-ui" };
+    const axis = axisStyle();
     this.#plot = new uPlot(
       {
         width: host.clientWidth || 300,

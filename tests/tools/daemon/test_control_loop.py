@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.cia402 import STATE_TABLE, State
 from cdpr_rt.core.cycle_row import Row
-from cdpr_rt.core.states import LoopState
+from cdpr_rt.core.states import EMERGENCY_STOP, LoopState
 from cdpr_rt.refusal import CommandRefusal
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
@@ -205,6 +205,25 @@ def test_an_emergency_stop_without_power_latches_in_each_state(ready: LoopRig) -
     assert ready.status["reason"] == "emergency stop by cdpr estop"
     assert number
     ready.obeyed("acknowledge")
+
+
+def test_released_buses_are_closed_and_an_emergency_stop_is_then_only_reported(
+    ready: LoopRig,
+) -> None:
+    ready.obeyed("enable")
+    assert not ready.command("release")["ok"]  # with power
+    ready.obeyed("disable")
+    ready.obeyed("release")
+    assert ready.state is LoopState.UNCONFIGURED
+    assert ready.machine.device is None
+    assert "procedure" in ready.status["reason"]
+    ready.loop.request_power_off()  # whoever has the buses must obey it
+    ready.turn(2)
+    assert ready.state is LoopState.UNCONFIGURED
+    assert ready.status["reason"] == EMERGENCY_STOP
+    ready.obeyed("configure")
+    ready.obeyed("check")
+    assert ready.status["reason"] == ""
 
 
 def test_a_drive_fault_quick_stops_the_other_drives_and_latches(jogging: LoopRig) -> None:

@@ -1,0 +1,193 @@
+"""Procedures of the page: one at a time, under the right to move, from a fixed list."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import struct
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from cdpr_rt.service.procedure_runner import Procedure, ProcedureError
+from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
+
+RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
+COMMISSION = {"procedure": "commission", "axes": ["left"], "detached": True, "client": "maria"}
+AT_WORK = """
+import json, os, pathlib, signal, sys, threading, time
+stops = []
+signal.signal(signal.SIGINT, lambda *_: stops.append(1))
+threading.Thread(target=lambda: (sys.stdin.read(), stops.append(2)), daemon=True).start()
+print(json.dumps({"progress": {"what": "slow sweeps", "share": 0.5}}), flush=True)
+print(os.environ["TOKEN"] != "", "drum turns", file=sys.stderr, flush=True)
+while not stops and not pathlib.Path(sys.argv[1], "done").exists():
+    time.sleep(0.01)
+pathlib.Path(sys.argv[1], "report.html").write_text("<p>good")
+print(json.dumps({"ok": not stops, "stops": stops}), flush=True)
+"""
+
+
+@pytest.fixture
+def folder(rig: Rig, tmp_path: Path) -> Iterator[Path]:
+    """Let the service run a made-up procedure in this folder; it ends when `done` is there."""
+
+    def plan(request: Any) -> Procedure:
+        if request.axes != ["left"]:
+            raise ProcedureError("axis 'up'; allowed: left, right")
+        command = (sys.executable, "-c", AT_WORK, str(tmp_path))
+        reports = (("left", "report.html"), ("right", "nothing.html"))
+        return Procedure("commissioning", (command,), "TOKEN", tmp_path, reports, takes_bus=True)
+
+    rig.service.procedures.plan = plan
+    yield tmp_path
+    (tmp_path / "done").touch()
+    wait_for(lambda: not job(rig)["running"])
+    rig.service.procedures.plan = None
+
+
+def job(rig: Rig) -> dict[str, Any]:
+    return dict(httpx.get(f"{rig.guarded_url}/procedure", headers=RIGHT).json())
+
+
+def ask(rig: Rig, body: Any, **headers: str) -> httpx.Response:
+    return httpx.post(f"{rig.guarded_url}/procedure", json=body, headers={**RIGHT, **headers})
+
+
+@contextlib.contextmanager
+def in_control(rig: Rig, ttl_s: float = 10.0) -> Iterator[dict[str, str]]:
+    body = {"client": "maria", "ttl_s": ttl_s}
+    answer = httpx.post(f"{rig.guarded_url}/control", json=body, headers=RIGHT)
+    yield {"X-Control-Token": answer.json()["token"]}
+    rig.reset()
+
+
+def test_a_procedure_takes_the_buses_reports_progress_and_serves_its_report(
+    rig: Rig, folder: Path
+) -> None:
+    with in_control(rig) as token:
+        assert ask(rig, COMMISSION, **token).json()["running"]
+        wait_for(lambda: job(rig)["steps"] == [{"what": "slow sweeps", "share": 0.5}])
+        wait_for(lambda: job(rig)["lines"] == ["True drum turns"])
+        assert [one["do"] for one in rig.loop.commands] == ["release"]
+        second = ask(rig, COMMISSION, **token)
+        assert (second.status_code, second.json()["error"]) == (409, "commissioning is running")
+        (folder / "done").touch()
+        wait_for(lambda: not job(rig)["running"])
+        assert [one["do"] for one in rig.loop.commands] == ["release", "configure", "check"]
+    ended = job(rig)
+    assert ended["result"] == {"ok": True, "stops": []}
+    (report,) = ended["reports"]
+    assert httpx.get(f"{rig.guarded_url}{report['path']}").text == "<p>good"
+
+
+@pytest.mark.parametrize("how", ["DELETE /procedure", "POST /hold", "the right", "its client"])
+def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path, how: str) -> None:
+    with in_control(rig, 0.3 if how == "its client" else 10.0) as token:
+        assert ask(rig, COMMISSION, **token).status_code == 200
+        wait_for(lambda: job(rig)["steps"])
+        if how == "the right":
+            url = f"{rig.guarded_url}/control"
+            assert httpx.delete(url, headers={**RIGHT, **token}).status_code == 200
+        elif how != "its client":
+            method, path = how.split()
+            answer = httpx.request(method, f"{rig.guarded_url}{path}", headers=RIGHT)
+            assert answer.status_code == 200
+        wait_for(lambda: not job(rig)["running"])
+    assert job(rig)["result"] == {"ok": False, "stops": [1]}
+    assert job(rig)["error"].startswith("ended: ")
+
+
+def test_a_dead_service_takes_its_procedure_with_it(rig: Rig, folder: Path) -> None:
+    with in_control(rig) as token:
+        ask(rig, COMMISSION, **token)
+        wait_for(lambda: job(rig)["steps"])
+        process = rig.service.procedures._process
+        assert process is not None and process.stdin is not None
+        process.stdin.close()  # as the kernel does
+        wait_for(lambda: not job(rig)["running"])
+    assert job(rig)["result"] == {"ok": False, "stops": [2]}
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "why"),
+    [
+        ({**COMMISSION, "procedure": "sh"}, 422, "procedure"),
+        ({**COMMISSION, "detached": False}, 422, "detached"),
+        ({**COMMISSION, "axes": []}, 422, "axes"),
+        ({**COMMISSION, "axes": ["a" * 65]}, 422, "axes"),
+        ({**COMMISSION, "out": "/etc"}, 422, "out"),
+        ({"procedure": "adopt", "measurement": "../../etc"}, 422, "measurement"),
+        ({**COMMISSION, "axes": ["--help; rm -r /"]}, 409, "allowed: left, right"),
+        (["commission"], 422, ""),
+    ],
+)
+def test_only_listed_procedures_with_checked_values_begin(
+    rig: Rig, folder: Path, body: Any, status: int, why: str
+) -> None:
+    with in_control(rig) as token:
+        answer = ask(rig, body, **token)
+    assert answer.status_code == status
+    assert why in answer.json()["error"]
+    assert not job(rig)["running"]
+    assert not rig.loop.commands
+
+
+def test_a_procedure_needs_the_key_the_right_to_move_and_the_pages_own_origin(
+    rig: Rig, folder: Path
+) -> None:
+    url = f"{rig.guarded_url}/procedure"
+    assert httpx.post(url, json=COMMISSION).status_code == 401
+    assert httpx.get(url).status_code == httpx.delete(url).status_code == 401
+    assert httpx.get(f"{url}/curves").status_code == 401
+    assert ask(rig, COMMISSION).status_code == 409
+    assert ask(rig, COMMISSION, **{"X-Control-Token": "wrong"}).status_code == 409
+    assert ask(rig, COMMISSION, Origin="http://elsewhere.example").status_code == 403
+    assert not job(rig)["running"]
+
+
+def test_no_file_but_those_of_a_report_is_served(rig: Rig, folder: Path) -> None:
+    secret = folder.parent / "secret.html"
+    secret.write_text("of others")
+    (folder / "link.html").symlink_to(secret)
+    (folder / "raw.bin").touch()
+    (folder / "done").touch()
+    with in_control(rig) as token:
+        ask(rig, COMMISSION, **token)
+        wait_for(lambda: not job(rig)["running"])
+    root = rig.guarded_url + job(rig)["reports"][0]["path"].rpartition("/")[0]
+    for name in ("..%2fsecret.html", "link.html", "raw.bin", "%2fetc%2fpasswd", "", "nothing.html"):
+        assert httpx.get(f"{root}/{name}").status_code == 404, name
+    assert httpx.get(f"{rig.guarded_url}/reports/guess/report.html").status_code == 404
+    headers = httpx.get(f"{root}/report.html").headers
+    assert "sandbox" in headers["content-security-policy"]
+
+
+def test_the_curves_of_a_log_that_is_being_written_are_read(rig: Rig, folder: Path) -> None:
+    columns = ["time_s", "setpoint_rad[0]", "position_rad[0]", "torque_actual_Nm[0]"]
+    header = {"format": "cdpr-rt raw log", "version": 1, "columns": columns, "period_s": 0.001}
+    with in_control(rig) as token:
+        ask(rig, COMMISSION, **token)
+        wait_for(lambda: job(rig)["steps"])
+        raw = folder / "left" / "raw"
+        raw.mkdir(parents=True)
+        text = json.dumps({**header, "what": "sweep", "rows": None}).encode().ljust(4095) + b"\n"
+        rows = b"".join(_row(k) for k in range(50_000))
+        (raw / "sweep-0.raw").write_bytes(text + rows + b"half")
+        os.utime(raw / "sweep-0.raw", (time.time() + 1, time.time() + 1))
+        found = httpx.get(f"{rig.guarded_url}/procedure/curves", headers=RIGHT).json()
+    assert found["name"] == "sweep"
+    assert 250 < len(found["time_s"]) < 350
+    assert found["time_s"][0] == pytest.approx(-30.0, abs=0.2)
+    assert found["error_deg"][5] == pytest.approx(57.2958, abs=1e-3)
+    assert found["torque_Nm"][5] == 0.5
+
+
+def _row(k: int) -> bytes:
+    return struct.pack("<4d", 1e-3 * k, 2.0, 1.0, 0.5)
