@@ -33,6 +33,8 @@ _GAP_S: Final = 0.05
 """Poses farther apart are not interpolated."""
 _FEWEST: Final = 3
 _CLOCK_STEP_S: Final = 0.02
+_LEAST_S: Final = 1.0
+"""Shorter recordings do not show whether the clocks agree."""
 _ALIKE: Final = 0.8
 """Least correlation of rates at which another difference of the clocks is suggested."""
 _BETTER: Final = 0.2
@@ -214,6 +216,8 @@ def _require_same_clock(
     """
     from scipy.signal import correlate, correlation_lags  # noqa: PLC0415  # slow to load
 
+    if min(np.ptp(time), np.ptp(poses.time_s)) < _LEAST_S:
+        return []
     exits = np.array(model.platform.exit_points_m)
     k = exits.shape[1]
     apart = np.linalg.norm(exits[None] - poses.position_m[:, None, :k], axis=2)
