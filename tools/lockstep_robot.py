@@ -50,7 +50,7 @@ from cdpr_rt.service.stream_packet import (
 )
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
-from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells
+from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells, RobotSimulator
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.recordings.pose_log import PoseLogTail
 
@@ -193,8 +193,8 @@ class LockstepRobot:
     simulated camera on the platform. Rows of the last `ring_s` are kept. If `pinned`, the simulator
     and all of this process share one core. `simulator` is a simulator that was started with these
     arguments; it belongs to this robot from `__enter__` on. The right to move is held from the
-    beginning, see `right`. Raises CommandError, DriverError and ProfileError as `cdpr run` does,
-    Error if the robot does not get ready.
+    beginning, see `right`. Unless `boots`, the caller boots it. Raises CommandError, DriverError
+    and ProfileError as `cdpr run` does, Error if the robot does not get ready.
     """
 
     look_s = 0.02
@@ -216,7 +216,8 @@ class LockstepRobot:
         camera: Path | None = None,
         ring_s: float = RING_S,
         pinned: bool = True,
-        simulator: LockstepSimulator | None = None,
+        simulator: RobotSimulator | None = None,
+        boots: bool = True,
     ) -> None:
         loaded = load_robot(robot)
         self.robot = with_commissioned(
@@ -229,7 +230,7 @@ class LockstepRobot:
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
         self._ring_s, self._pinned = ring_s, pinned
-        self._own, self._simulator = own, simulator
+        self._own, self._simulator, self._boots = own, simulator, boots
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = self._began = 0
@@ -263,12 +264,18 @@ class LockstepRobot:
 
     def _start(self, stack: ExitStack) -> None:
         robot, limits, port = self.robot, self._limits, None
-        self.simulator = simulator = self._simulator or LockstepSimulator(
-            *(robot, self._reference, self._plant, self._truth_path, self._scanner, self._camera)
-        )
+        own = None
+        if (simulator := self._simulator) is None:
+            simulator = own = LockstepSimulator(
+                *(robot, self._reference, self._plant),
+                *(self._truth_path, self._scanner, self._camera),
+            )
+        self.simulator = simulator
         stack.callback(simulator.stop)
         self.folder, self._truth_path = simulator.folder, simulator.truth_log
-        self.block = block = SharedBlock.create(len(robot.axes), self._ring_s, 1.0 / self.period_s)
+        self.block = block = SharedBlock.create(
+            len(robot.axes), self._ring_s, 1.0 / self.period_s, private=simulator.local
+        )
         stack.callback(os.close, block.fd)
         parts = loop_parts(robot, limits, block, learns=self._learns, own=self._own)
         simulator.await_ready()
@@ -297,14 +304,16 @@ class LockstepRobot:
             self.recorder = Recorder(block, self._record, robot.profile)
             stack.callback(self._end_recording)
             self.recorder.begin()
-        self._boot()
+        if self._boots:
+            self.boot()
         self._began = self.rows_written
         if self._truth_path is not None:
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
-        if self._pinned:
-            stack.enter_context(one_core(simulator.process.pid))
+        if self._pinned and own is not None:
+            stack.enter_context(one_core(own.process.pid))
 
-    def _boot(self) -> None:
+    def boot(self) -> None:
+        """Boot and check the drives; take the right to move. Raises Error if that fails."""
         loop = self.loop
         loop.runner.begin(loop.transitions.start_up())
         self._turn_until(lambda: not loop.busy, 60.0, "the boot")

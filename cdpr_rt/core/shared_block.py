@@ -94,7 +94,7 @@ class SharedBlock:
     With a descriptor that was opened for reading only, the arrays are read-only.
     """
 
-    def __init__(self, fd: int, n: int, capacity: int) -> None:
+    def __init__(self, fd: int, n: int, capacity: int, *, private: bool = False) -> None:
         self.fd = fd
         self.n = n
         self.capacity = capacity
@@ -102,6 +102,8 @@ class SharedBlock:
         sizes = _sizes(n, capacity)
         reads_only = fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
         access = mmap.ACCESS_READ if reads_only else mmap.ACCESS_WRITE
+        if private:
+            access = mmap.ACCESS_COPY
         self._map = mmap.mmap(fd, sum(sizes), access=access)
         views, first = [], 0
         for size in sizes:
@@ -117,10 +119,13 @@ class SharedBlock:
         self.rows: Row = views[7].view(cycle_dtype(n))
 
     @classmethod
-    def create(cls, n: int, seconds: float, rate_Hz: float) -> SharedBlock:
+    def create(
+        cls, n: int, seconds: float, rate_Hz: float, *, private: bool = False
+    ) -> SharedBlock:
         """Make a block for n axes whose ring holds `seconds` of cycles at `rate_Hz`.
 
-        Raises SharedBlockError if there are more axes than a loop can run.
+        With `private`, only this process sees the data, and a fork of it has a copy. Raises
+        SharedBlockError if there are more axes than a loop can run.
         """
         if not 1 <= n <= MOST_AXES:
             raise SharedBlockError(f"{n} axes; allowed: 1 to {MOST_AXES}")
@@ -129,7 +134,7 @@ class SharedBlock:
         os.set_inheritable(fd, True)
         os.ftruncate(fd, sum(_sizes(n, capacity)))
         fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _SEALS)
-        block = cls(fd, n, capacity)
+        block = cls(fd, n, capacity, private=private)
         block.counters["axes"], block.counters["capacity"] = n, capacity
         block.counters["magic"] = MAGIC
         return block

@@ -8,7 +8,7 @@ import math
 import socket
 import struct
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 from cdpr_drivers.bus.frames import (
@@ -36,6 +36,9 @@ _CLOSED = "the simulated bus closed the connection; it accepts only the user who
 # the hub accepts control messages below 448 bytes; a pair takes up to 24
 _FILTERS_A_MESSAGE = 16
 
+in_this_process: Final[dict[str, Callable[[], socket.socket]]] = {}
+"""Buses that run in this process: by name, a function that returns a new connection."""
+
 
 def connect(name: str) -> socket.socket:
     """Return a blocking socket connected to the bus `name`.
@@ -43,6 +46,8 @@ def connect(name: str) -> socket.socket:
     Raises:
         BusError: no simulated bus of that name runs on this machine.
     """
+    if name in in_this_process:
+        return in_this_process[name]()
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     try:
         sock.connect(f"\0cdpr-rt/simbus/{name}")

@@ -79,6 +79,14 @@ class Watcher:
         self.looked_s = time.monotonic()
         return self._poller.poll(wait_s, _EVENTS)
 
+    def after_fork(self) -> None:
+        """Watch the same descriptors as before, apart from the process that has forked."""
+        poller = select.epoll()
+        for descriptor in self.handlers:
+            poller.register(descriptor, select.EPOLLIN)
+        os.dup2(poller.fileno(), self._poller.fileno(), inheritable=False)
+        poller.close()
+
     def close(self) -> None:
         """Close its own descriptors."""
         self._poller.close()
@@ -356,6 +364,10 @@ class Hub:
     def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
         """Call `handler` whenever `descriptor` is readable."""
         self._watcher.add(descriptor, handler)
+
+    def after_fork(self) -> None:
+        """Stop sharing the loop with the process that has forked."""
+        self._watcher.after_fork()
 
     def listen(self) -> None:
         """Open the bus under its name.

@@ -7,6 +7,7 @@ import os
 import select
 import subprocess
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -148,39 +149,28 @@ class OwnSimulator(_OwnProcess):
         super().__init__(*command, meanwhile=meanwhile, waits=waits)
 
 
-class LockstepSimulator(OwnSimulator):
-    """A simulator of `robot` in lockstep, on a separate bus, with a folder for its files.
+class RobotSimulator(ABC):
+    """A simulator of one robot in lockstep, and the folder for its files."""
 
-    The process has started, but it is ready only after `await_ready`. `reference` is the name or
-    file of the robot. The true pose of a platform is logged to `truth_log`, by default to a file in
-    the folder.
-    """
+    local: bool
+    """Whether it runs in this process."""
+    bus: str
+    folder: Path
+    """Folder for temporary files, removed at the end."""
+    truth_log: Path | None
+    board: Path | None
 
-    def __init__(
-        self,
-        robot: Robot,
-        reference: str,
-        plant: Path | None,
-        truth_log: Path | None = None,
-        scanner: Path | None = None,
-        camera: Path | None = None,
-    ) -> None:
-        self._channel: SimulatorChannel | None = None
-        self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
-        self.folder = Path(self._temporary.name)
-        """Folder for temporary files, removed at the end."""
-        if truth_log is None and robot.platform is not None:
-            truth_log = self.folder / "truth.log"
-        self.truth_log = truth_log
-        self._robot = robot
-        self.board = None if robot.tension_sensors is None else self.folder / "board"
-        super().__init__(
-            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, truth_log),
-            board=self.board,
-            scanner=scanner,
-            camera=camera,
-            waits=False,
-        )
+    @abstractmethod
+    def await_ready(self) -> str:
+        """Wait until it is ready."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """End the simulator, and remove its folder."""
+
+    @abstractmethod
+    def _ask(self, key: str, value: Any = True) -> Any:
+        """Return the answer to a request beside the buses; raises BadInputError."""
 
     def inject(
         self,
@@ -209,6 +199,43 @@ class LockstepSimulator(OwnSimulator):
         """
         return dict(self._ask("truth"))
 
+
+class LockstepSimulator(OwnSimulator, RobotSimulator):
+    """A simulator of `robot` in lockstep, on a separate bus, with a folder for its files.
+
+    The process has started, but it is ready only after `await_ready`. `reference` is the name or
+    file of the robot. The true pose of a platform is logged to `truth_log`, by default to a file in
+    the folder.
+    """
+
+    local = False
+
+    def __init__(
+        self,
+        robot: Robot,
+        reference: str,
+        plant: Path | None,
+        truth_log: Path | None = None,
+        scanner: Path | None = None,
+        camera: Path | None = None,
+    ) -> None:
+        self._channel: SimulatorChannel | None = None
+        self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
+        self.folder = Path(self._temporary.name)
+        if truth_log is None and robot.platform is not None:
+            truth_log = self.folder / "truth.log"
+        self.truth_log = truth_log
+        self._robot = robot
+        self.board = None if robot.tension_sensors is None else self.folder / "board"
+        super().__init__(
+            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, truth_log),
+            board=self.board,
+            scanner=scanner,
+            camera=camera,
+            waits=False,
+        )
+
+    @override
     def _ask(self, key: str, value: Any = True) -> Any:
         if self._channel is None:
             url = next(iter(robot_urls(self._robot, [self.bus]).values()))
