@@ -53,6 +53,9 @@ SIM = {
     "sim_fault": {
         "fault": "Break a running simulated robot: a cable, an encoder, a drive; or mend it.",
     },
+    "sim_campaign": {
+        "campaign": "Play random users' actions and faults on simulated robots, and judge them.",
+    },
     "sim_camera": {
         "camera": "Run a camera on a simulated platform until Ctrl-C; other commands use it as "
         "sim:SOCKET.",

@@ -1,0 +1,239 @@
+"""Run the seeds of a campaign: each in a fork of a robot that has already come to its start."""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from cdpr_rt.robot import Error
+from cdpr_tools.campaign.judge import Result, judge
+from cdpr_tools.campaign.play import STARTS, Player, RobotAtStart, output_to
+from cdpr_tools.campaign.scenario import Scenario
+from cdpr_tools.processes import module_command
+
+_SEED_S: Final = 150.0
+"""Wall time after which a seed counts as hung."""
+_OUTPUT: Final = "output.txt"
+_AT_MOST: Final = 4000
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Scenarios of one robot with one plant; a job of a runner."""
+
+    scenarios: tuple[Scenario, ...]
+
+    def run(self) -> list[Result]:
+        """Return the results, in the order of the scenarios."""
+        return _server().run(self.scenarios)
+
+
+# One process for each process that runs jobs: it has no threads, so it can be forked.
+
+
+class _Server:
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            module_command("cdpr_tools.campaign.farm"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+        )
+
+    def run(self, scenarios: Sequence[Scenario]) -> list[Result]:
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None  # opened with PIPE
+        process.stdin.write(json.dumps([asdict(one) for one in scenarios]).encode() + b"\n")
+        process.stdin.flush()
+        line = process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"the process of the seeds has ended: {process.wait()}")
+        return [_result(one) for one in json.loads(line)]
+
+
+_servers: list[_Server] = []
+
+
+def _server() -> _Server:
+    if not _servers:
+        _servers.append(_Server())
+    return _servers[0]
+
+
+def _result(data: dict[str, Any]) -> Result:
+    return Result(**data | {"faults": [tuple(pair) for pair in data["faults"]]})
+
+
+def _serve() -> None:
+    """Run the jobs that arrive on standard input, one a line, until it ends."""
+    out = os.dup(1)
+    os.dup2(2, 1)  # nothing but results may go to the caller
+    for line in sys.stdin:
+        given = [Scenario(**one) for one in json.loads(line)]
+        found = run_scenarios(given)
+        os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
+
+
+# Forks.
+
+
+def run_scenarios(scenarios: Sequence[Scenario]) -> list[Result]:
+    """Run scenarios of one robot with one plant, from snapshots; return results in their order."""
+    found: dict[int, Result] = {}
+    lines = _in_fork(lambda out: _from_snapshots(scenarios, out), _SEED_S * (1 + len(scenarios)))
+    for data in lines:
+        number = data.pop("number")
+        found[number] = _result(data)
+    return [
+        found.get(i) or Result(one.seed, one.robot, [f"crash: no result: {lines.end}"])
+        for i, one in enumerate(scenarios)
+    ]
+
+
+def _from_snapshots(scenarios: Sequence[Scenario], out: int) -> None:
+    """Bring a robot from start to start, and fork it for each scenario that begins there."""
+    folder = Path(tempfile.mkdtemp(prefix="cdpr-campaign-"))
+    try:
+        start = RobotAtStart(scenarios[0], folder)
+        why = ""
+        with output_to(folder / _OUTPUT), start.rig:
+            for where in STARTS:
+                if not why and any(STARTS.index(s.start) >= STARTS.index(where) for s in scenarios):
+                    try:
+                        start.advance(where)
+                    except Error as error:
+                        why = str(error)
+                start.simulator.before_fork()
+                gc.collect()
+                gc.freeze()
+                for number, scenario in enumerate(scenarios):
+                    if scenario.start != where:
+                        continue
+                    result = Result(scenario.seed, scenario.robot, notes=[f"did not start: {why}"])
+                    if not why:
+                        result = _fork_seed(scenario, start, folder)
+                    _write(out, asdict(result) | {"number": number})
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _fork_seed(scenario: Scenario, start: RobotAtStart, folder: Path) -> Result:
+    own = folder / "seed"
+    own.mkdir()
+
+    def play(out: int) -> None:
+        start.simulator.after_fork(own)
+        start.rig.folder = own
+        result = play_and_judge(scenario, start, own)
+        result.cpu_s = round(time.process_time(), 3)  # a fork begins at 0
+        _write(out, asdict(result))
+
+    lines = _in_fork(play, _SEED_S, own)
+    results = list(lines)
+    said = (own / _OUTPUT).read_text(errors="replace") if (own / _OUTPUT).exists() else ""
+    shutil.rmtree(own, ignore_errors=True)
+    if results:
+        result = _result(results[0])
+    else:
+        why = f"crash: {lines.end}: {said[-_AT_MOST:]}"
+        result = Result(scenario.seed, scenario.robot, [why])
+    return result
+
+
+def play_and_judge(scenario: Scenario, start: RobotAtStart, folder: Path) -> Result:
+    """Play a scenario and judge it."""
+    with output_to(folder / _OUTPUT):
+        played = Player(scenario, start).play()
+    played.output = (folder / _OUTPUT).read_text(errors="replace")
+    return judge(played, start.rig.robot)
+
+
+def run_alone(scenario: Scenario, folder: Path, record: Path | None = None) -> Result:
+    """Run a scenario on a robot that is started for it, in this process; record it in `record`."""
+    start = RobotAtStart(scenario, folder, record)
+    with start.rig:
+        for where in STARTS[: STARTS.index(scenario.start) + 1]:
+            start.advance(where)
+        return play_and_judge(scenario, start, folder)
+
+
+class _Lines:
+    """Lines of JSON from a fork, until it ends; then `end` says how."""
+
+    def __init__(self, pid: int, descriptor: int, within_s: float) -> None:
+        self.end = "still runs"
+        self._pid, self._descriptor, self._within_s = pid, descriptor, within_s
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        rest, ended = b"", False
+        deadline_s = time.monotonic() + self._within_s
+        while not ended and (left_s := deadline_s - time.monotonic()) > 0.0:
+            if select.select([self._descriptor], [], [], left_s)[0]:
+                data = os.read(self._descriptor, 1 << 16)
+                ended = not data
+                *lines, rest = (rest + data).split(b"\n")
+                yield from map(json.loads, lines)
+        if not ended:
+            os.kill(self._pid, signal.SIGKILL)
+        os.close(self._descriptor)
+        status = os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+        self.end = f"exit status {status}" if ended else f"hung for {self._within_s:g} s"
+
+
+def _in_fork(work: Callable[[int], None], within_s: float, folder: Path | None = None) -> _Lines:
+    """Run `work` in a fork; it writes its results to a descriptor."""
+    inner, outer = os.pipe()
+    pid = os.fork()
+    if not pid:
+        os.close(inner)
+        _end_with(work, outer, within_s, folder)
+    os.close(outer)
+    return _Lines(pid, inner, within_s)
+
+
+def _end_with(
+    work: Callable[[int], None], out: int, within_s: float, folder: Path | None
+) -> NoReturn:
+    """Do the work of a fork and end it without the cleanup of its parent."""
+    status = 1
+    try:
+        if folder is not None:
+            with (folder / _OUTPUT).open("a") as file:
+                faulthandler.dump_traceback_later(within_s - 5.0, file=file)
+                work(out)
+        else:
+            work(out)
+        status = 0
+    except BaseException:
+        text = traceback.format_exc()
+        if folder is not None:
+            with (folder / _OUTPUT).open("a") as file:
+                file.write(text)
+        else:
+            os.write(2, text.encode())
+    finally:
+        os._exit(status)
+
+
+def _write(out: int, data: dict[str, Any]) -> None:
+    text = json.dumps(data).encode() + b"\n"
+    while text:
+        text = text[os.write(out, text) :]
+
+
+if __name__ == "__main__":
+    _serve()

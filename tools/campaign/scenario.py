@@ -1,0 +1,200 @@
+"""Scenarios: what users do with a robot and which faults happen, as data drawn from a seed."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final, Self
+
+from cdpr_profiles import Robot
+from cdpr_profiles.bounded_input import parse_json
+from cdpr_profiles.errors import ProfileError
+from cdpr_sim_bus.cia402.faults import FAULTS as SIMULATED
+from cdpr_tools.errors import BadInputError
+
+BEFORE_BOOT, READY, TIGHT = "before boot", "ready", "tight"
+"""States of the robot when a scenario begins."""
+
+Action = dict[str, Any]
+"""What a user does: `do`, its arguments, and `wait_s`, the bus time until the next action."""
+
+_SEEDS_A_PLANT: Final = 100
+_RECOVERED, _RECORDED, _DYING = 0.2, 0.1, 0.08
+_CLOSE_S: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One bad day of a robot."""
+
+    seed: int
+    robot: str
+    plant: dict[str, Any]
+    """Content of the simulator's plant file."""
+    start: str
+    actions: tuple[Action, ...]
+    faults: tuple[dict[str, Any], ...]
+    """Orders of the simulator: `fault`, `axis` from 1, `value`, and `at_s` since the beginning."""
+    recovers: bool
+    """Whether the faults are repaired at the end, and the robot must work again."""
+    recorded: bool
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """Read a script; raises BadInputError."""
+        try:
+            given = parse_json(file.read_bytes(), str(file))
+            return cls(
+                **given
+                | {"actions": tuple(given["actions"]), "faults": tuple(given.get("faults", ()))}
+            )
+        except (OSError, ProfileError, TypeError, KeyError) as error:
+            raise BadInputError(f"{file}: not a script of a campaign: {error}") from None
+
+    def text(self) -> str:
+        """Return the script, as `load` reads it."""
+        return json.dumps(asdict(self), indent=1)
+
+    def plant_text(self) -> str:
+        """Return the plant file."""
+        tables = {key: value for key, value in self.plant.items() if isinstance(value, dict)}
+        lines = [f"{key} = {json.dumps(value)}" for key, value in self.plant.items()
+                 if key not in tables]  # fmt: skip
+        for table, values in tables.items():
+            lines += [f"[{table}]", *(f"{key} = {json.dumps(v)}" for key, v in values.items())]
+        return "\n".join([*lines, ""])
+
+
+def draw(seed: int, robots: Sequence[tuple[str, Robot]]) -> Scenario:
+    """Return the scenario of a seed for one of these robots, each with its name or file."""
+    rng = random.Random(f"campaign {seed}")
+    name, robot = rng.choice(robots)
+    start = rng.choices((TIGHT, READY, BEFORE_BOOT), (0.67, 0.25, 0.08))[0]
+    actions = [_action(rng, robot) for _ in range(rng.randint(3, 8))]
+    if start != TIGHT:
+        actions[:0] = [
+            {"do": "enable", "wait_s": _round(rng.uniform(0.005, 0.3))},
+            {"do": "tighten", "wait_s": _round(rng.choice((0.5, 2.0, 6.0, 12.0)) * rng.random())},
+        ]
+    if rng.random() < _DYING:
+        actions.append({"do": "die", "wait_s": 0.0})
+    span_s = 0.3 + sum(action["wait_s"] for action in actions)
+    at_s = sorted(rng.uniform(0.0, span_s) for _ in range(rng.randint(1, 3)))
+    if start == BEFORE_BOOT and rng.random() < 0.7:
+        at_s[0] = rng.uniform(0.0, 0.3)
+    if len(at_s) > 1 and rng.random() < 0.4:
+        at_s[1] = at_s[0] + rng.uniform(0.0, _CLOSE_S)
+    return Scenario(
+        seed, name, _plant(seed // _SEEDS_A_PLANT, robot), start, tuple(actions),
+        tuple(_fault(rng, len(robot.axes), one) for one in at_s),
+        rng.random() < _RECOVERED, rng.random() < _RECORDED,
+    )  # fmt: skip
+
+
+def _plant(number: int, robot: Robot) -> dict[str, Any]:
+    """Return deviations of a machine from its profile, as builders may make them."""
+    rng = random.Random(f"plant {number} {robot.name}")
+    return {
+        "seed": rng.randrange(2**31),
+        "platform": {"mass_error": _round(rng.uniform(-0.1, 0.1))},
+        "geometry": {"exit_sigma_m": _round(rng.uniform(0.0, 0.001))},
+        "cables": {
+            "stiffness_error": _round(rng.uniform(-0.2, 0.2)),
+            "friction_share": _round(rng.uniform(0.0, 0.04)),
+        },
+        "start": {"slack_m": _round(rng.uniform(0.005, 0.04))},
+    }
+
+
+def _round(value: float) -> float:
+    return round(value, 4)
+
+
+# What users do.
+
+
+def _action(rng: random.Random, robot: Robot) -> Action:
+    name = rng.choices(tuple(_ACTIONS), tuple(_ACTIONS.values()))[0]
+    action: Action = {"do": name, **_arguments(rng, robot, name)}
+    # most actions follow before the last one is done
+    action["wait_s"] = _round(rng.choice((0.02, 0.3, 1.2)) * rng.random())
+    return action
+
+
+_ACTIONS: Final = {
+    "move": 30, "stream": 8, "path": 3, "jog": 4, "hold": 10, "resume": 8, "disable": 5,
+    "enable": 6, "acknowledge": 5, "lower": 7, "tighten": 8, "stop": 4, "power off": 2,
+    "stall": 3, "leave": 3, "return": 4,
+}  # fmt: skip
+"""Actions and how often they are drawn."""
+
+
+def _arguments(rng: random.Random, robot: Robot, name: str) -> dict[str, Any]:
+    platform = robot.platform
+    assert platform is not None  # campaigns are for robots with a platform
+    if name == "jog":
+        return {"velocity_rad_s": [_round(rng.uniform(-2.0, 2.0)) for _ in robot.axes],
+                "duration_s": _round(rng.uniform(0.1, 1.0))}  # fmt: skip
+    if name == "stall":
+        return {"seconds": _round(math.exp(rng.uniform(math.log(0.003), math.log(1.0))))}
+    if name not in ("move", "stream", "path"):
+        return {}
+    low, high = platform.workspace_min_m, platform.workspace_max_m
+    reach = 1.15 if rng.random() < 0.3 else 0.9  # of the box; some places are beyond it
+    places = [
+        [_round(0.5 * (a + b) + reach * 0.5 * (b - a) * rng.uniform(-1.0, 1.0))
+         for a, b in zip(low, high, strict=True)]
+        for _ in range(3)
+    ]  # fmt: skip
+    if name == "path":
+        return {"points_m": places}
+    if name == "stream":
+        return {"to_m": places[0], "seconds": _round(rng.uniform(0.2, 1.2)),
+                "loss": rng.choice((0.0, 0.2, 0.9))}  # fmt: skip
+    given: dict[str, Any] = {"position_m": places[0]}
+    turns = len(platform.controlled) - len(low)
+    if turns > 0 and rng.random() < 0.3:
+        given["rotation_rad"] = [
+            _round(1.2 * platform.workspace_angle_rad * rng.uniform(-1.0, 1.0))
+            for _ in range(turns)
+        ]
+    if rng.random() < 0.3:
+        given["speed_m_s"] = _round(platform.speed_m_s * rng.uniform(0.05, 1.1))
+    return given
+
+
+# What breaks.
+
+
+def _fault(rng: random.Random, axes: int, at_s: float) -> dict[str, Any]:
+    name = rng.choice(tuple(FAULTS))
+    values = FAULTS[name]
+    value = None
+    if values:
+        low, high = values
+        value = rng.uniform(low, high)
+        if isinstance(low, int):
+            value = round(value)
+        value = _round(value)
+    return {"fault": name, "axis": rng.randint(1, axes), "value": value, "at_s": _round(at_s)}
+
+
+_RANGES: Final[dict[str, tuple[float, float] | None]] = {
+    "drive-off": None, "drive-reboot": None, "drive-fault": None, "power-lost": None,
+    "pre-operational": None, "nmt-stop": None, "commands-ignored": None,
+    "torque-stuck": None, "torque-bias": (-1.0, 1.0), "torque-limit": (0.1, 2.0),
+    "encoder-jump": (-4000, 4000), "encoder-frozen": None, "encoder-noise": (1.0, 200.0),
+    "silence": (1, 400), "bus-off": None, "bus-lost": None, "frames-lost": (1, 8),
+    "frames-lossy": (1.0, 60.0), "frames-doubled": (1, 60), "frames-late": (1, 8),
+    "frames-corrupted": (1, 8), "duplicate-node": None, "no-heartbeat": None,
+    "heartbeat-late": (50, 1000), "emcy": None, "emcy-flood": (1, 12),
+    "cut-cable": None, "slip": (5, 300), "caught-cable": None,
+    "push-x": (-80.0, 80.0), "push-y": (-80.0, 80.0), "obstacle": (1.0, 100.0),
+    "payload": (0.2, 4.0),
+}  # fmt: skip
+"""Faults and the range of their values; None for the usual value."""
+FAULTS: Final = {name: values for name, values in _RANGES.items() if name in SIMULATED}
