@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
+
+from tests.slower_robot import slower_robot
 
 SCRIPT = """
 import sys
@@ -19,7 +22,7 @@ def compiled():
         if isinstance(kernel, CPUDispatcher)
     }
 
-with LockstepRobot("planar-3") as robot:
+with LockstepRobot(sys.argv[1]) as robot:
     before = compiled()
     robot.enable()
     robot.carry_out("tighten", 30.0)
@@ -40,10 +43,14 @@ print(sum(before.values()), sorted(late))
 """
 
 
-def test_no_kernel_is_compiled_between_the_first_power_and_a_fault():
+def test_no_kernel_is_compiled_between_the_first_power_and_a_fault(tmp_path: Path) -> None:
     """This needs a separate process, because other tests compile kernels too."""
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", SCRIPT, slower_robot(tmp_path, "planar-3")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     kernels, _, late = done.stdout.strip().partition(" ")

@@ -13,6 +13,7 @@ from cdpr_rt.diagnosis.predictions import SWING_S, CableLoss
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.pose_log import read_pose_log
+from tests.slower_robot import slower_robot
 
 CUT = 12
 MOST = 1.3
@@ -32,10 +33,7 @@ LEAST = 0.4
 def test_a_platform_swings_as_fast_and_as_far_as_predicted(
     robot: Path, cable: int, place_m: tuple[float, ...], tmp_path: Path
 ) -> None:
-    slower = tmp_path / robot.name
-    text = robot.read_text()
-    assert text.count("sync_period_s") == 1
-    slower.write_text(text.replace("sync_period_s = 0.001", "sync_period_s = 0.002"))
+    slower = slower_robot(tmp_path, robot)
     predicted = CableLoss(Subject(load_robot(slower))).swing(cable, place_m)
     with LockstepRobot(slower) as rig:
         rig.enable()

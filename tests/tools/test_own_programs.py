@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import cdpr_rt as cdpr
-from cdpr_profiles.places import SHIPPED
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.own_program import checked_programs
+from tests.slower_robot import slower_robot
 
 Failing = Callable[[float], object]
 
@@ -61,10 +61,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> cdpr.Robot:
     (info / "entry_points.txt").write_text("[cdpr_rt.programs]\nwait = programs_of_others:Wait\n")
     (tmp_path / "programs_of_others.py").write_text(REGISTERED)
     monkeypatch.syspath_prepend(str(tmp_path))
-    path = tmp_path / "planar-3.toml"
-    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    path.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
-    return cdpr.simulate(path, programs=[Swing()])
+    return cdpr.simulate(slower_robot(tmp_path, "planar-3"), programs=[Swing()])
 
 
 def raising(_time_s: float) -> object:
@@ -155,7 +152,7 @@ class Named(Swing):
         (Named("Big Swing"), "mine: name: 'Big Swing'; allowed: small letters"),
         (Named(None), "mine: name: None; allowed"),
         (Named("other", {"x-y": (0.0, 1.0, 0.5)}), "mine: arguments: 'x-y'"),
-        (Named("other", {"x": (0.0, 1.0)}), "mine: arguments: 'x': .*the default between them"),
+        (Named("other", {"x": (0.0, 1.0)}), "mine: arguments: 'x': .*lowest, highest, default"),
         (Named("other", {"x": (0.0, 1.0, 2.0)}), "mine: arguments: 'x'"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.slower_robot import slower_robot
 
 pytestmark = pytest.mark.long
 
@@ -18,9 +19,8 @@ AXIS, CELL_OFF = 1, 14
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Iterator[LockstepRobot]:
-    text = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    file = tmp_path / "with-cells.toml"
-    file.write_text('tension_sensors = "cells.toml"\n' + text)
+    file = slower_robot(tmp_path, "planar-3")
+    file.write_text('tension_sensors = "cells.toml"\n' + file.read_text())
     cells = (SHIPPED / "tension_sensors" / "rtu-load-cells-8.toml").read_text()
     parts = cells.split("[[sensors]]")
     (tmp_path / "cells.toml").write_text("[[sensors]]".join(parts[:4]))

@@ -13,26 +13,20 @@ from cdpr_tools.lockstep_robot import LockstepRobot
 pytestmark = pytest.mark.long
 
 
-@pytest.mark.parametrize(("answer_s", "oscillates"), [(0.0005, False), (0.0055, True)])
-def test_an_oscillating_loop_is_reported_in_the_status(
-    tmp_path: Path, answer_s: float, oscillates: bool
-) -> None:
+def test_an_oscillating_loop_is_reported_in_the_status(tmp_path: Path) -> None:
     plant = tmp_path / "plant.toml"
-    plant.write_text(f"[motor.drive]\nfeedback_delay_s = {answer_s}\n")
+    plant.write_text("[motor.drive]\nfeedback_delay_s = 0.0055\n")
     with LockstepRobot("planar-4", plant=plant) as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[0.0, 1.55])
         tension_N = []
-        for _ in range(1000):
+        for _ in range(400):
             robot.turn(6)
             tension_N.append(robot.truth()["tension_N"].copy())
         assert robot.state is LoopState.ACTIVE, robot.state_text()
         told = robot.status()["notices"]
-        assert bool(np.ptp(tension_N, axis=0).max() > 25.0) is oscillates
-        if not oscillates:
-            assert not told
-            return
+        assert np.ptp(tension_N, axis=0).max() > 25.0
         (notice,) = (text for text in told if "oscillates at this winch" in text)
         assert ": the control loop oscillates at this winch: for 1 s at 3" in notice
         robot.carry_out("lower")

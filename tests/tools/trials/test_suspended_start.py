@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.slower_robot import slower_robot
 
 pytestmark = pytest.mark.long
 
@@ -28,9 +31,9 @@ def test_cogging_and_friction_at_the_start_do_not_falsify_lengths() -> None:
     np.testing.assert_allclose(found_Nm, 0.08, atol=0.03)
 
 
-def test_six_suspended_cables_are_tightened_without_trouble() -> None:
+def test_six_suspended_cables_are_tightened_without_trouble(tmp_path: Path) -> None:
     """The estimated position changes while the force on the stand is removed."""
-    with LockstepRobot("suspended-6") as robot:
+    with LockstepRobot(slower_robot(tmp_path, "suspended-6")) as robot:
         robot.enable()
         robot.carry_out("tighten")
         assert not robot.progress["trouble"]

@@ -1,0 +1,40 @@
+"""Robots and a winch with long cycles, whose simulations take less time."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.places import SHIPPED
+
+PERIOD_S = 0.004
+
+
+def slower_robot(folder: Path, name: str | Path) -> Path:
+    """Write a robot with longer cycles. Return its file."""
+    return _slower(load_robot(name).path, folder)
+
+
+def _slower(given: Path, folder: Path) -> Path:
+    key = "sync_period_s = "
+    text, count = re.subn(rf"(?m)^{key}\S+", f"{key}{PERIOD_S}", given.read_text())
+    assert count == 1
+    path = folder / given.name
+    path.write_text(text)
+    return path
+
+
+def slower_profiles(config: Path) -> None:
+    """Write shipped robots and a winch with longer cycles as a user's own, which come first.
+
+    `config` is the value of XDG_CONFIG_HOME.
+    """
+    own = config / "cdpr-rt" / "profiles"
+    for kind, name in (
+        ("robots", "planar-3"),
+        ("robots", "planar-4"),
+        ("winches", "winch-mpp0923d"),
+    ):
+        (own / kind).mkdir(parents=True, exist_ok=True)
+        _slower(SHIPPED / kind / f"{name}.toml", own / kind)
