@@ -54,10 +54,6 @@ class Judge:
         times += [at_s for name, at_s in self.played.done if name in ("stall", "die")]
         return float(min(times))
 
-    def did(self, name: str) -> bool:
-        """Return whether a user did this."""
-        return any(done == name for done, _ in self.played.done)
-
     def named(self) -> Iterator[tuple[dict[str, Any], float, bool]]:
         """Yield each fault that the robot named: its record, when, and whether as the cause."""
         seen = set()

@@ -13,7 +13,6 @@ from typing import Any, Final, Self
 from cdpr_profiles import Robot
 from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.errors import ProfileError
-from cdpr_sim_bus.cia402.faults import FAULTS as SIMULATED
 from cdpr_tools.errors import BadInputError
 
 BEFORE_BOOT, READY, TIGHT = "before boot", "ready", "tight"
@@ -183,18 +182,9 @@ def _fault(rng: random.Random, axes: int, at_s: float) -> dict[str, Any]:
     return {"fault": name, "axis": rng.randint(1, axes), "value": value, "at_s": _round(at_s)}
 
 
-_RANGES: Final[dict[str, tuple[float, float] | None]] = {
-    "drive-off": None, "drive-reboot": None, "drive-fault": None, "power-lost": None,
-    "pre-operational": None, "nmt-stop": None, "commands-ignored": None,
-    "torque-stuck": None, "torque-bias": (-1.0, 1.0), "torque-limit": (0.1, 2.0),
-    "encoder-jump": (-4000, 4000), "encoder-frozen": None, "encoder-noise": (1.0, 200.0),
-    "silence": (1, 400), "bus-off": None, "bus-lost": None, "frames-lost": (1, 8),
-    "frames-lossy": (1.0, 60.0), "frames-doubled": (1, 60), "frames-late": (1, 8),
-    "frames-corrupted": (1, 8), "duplicate-node": None, "no-heartbeat": None,
-    "heartbeat-late": (50, 1000), "emcy": None, "emcy-flood": (1, 12),
-    "cut-cable": None, "slip": (5, 300), "caught-cable": None,
-    "push-x": (-80.0, 80.0), "push-y": (-80.0, 80.0), "obstacle": (1.0, 100.0),
-    "payload": (0.2, 4.0),
+FAULTS: Final[dict[str, tuple[float, float] | None]] = {
+    "cut-cable": None, "slip": (5, 300), "encoder-jump": (-4000, 4000), "drive-fault": None,
+    "silence": (1, 400), "pre-operational": None, "frames-lost": (1, 8),
+    "frames-doubled": (1, 60), "frames-late": (1, 8), "no-heartbeat": None, "emcy-flood": (1, 12),
 }  # fmt: skip
-"""Faults and the range of their values; None for the usual value."""
-FAULTS: Final = {name: values for name, values in _RANGES.items() if name in SIMULATED}
+"""Faults that are drawn, and the range of their values; None for the usual value."""
