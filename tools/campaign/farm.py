@@ -6,6 +6,7 @@ import faulthandler
 import gc
 import json
 import os
+import resource
 import select
 import shutil
 import signal
@@ -17,16 +18,18 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 from cdpr_rt.robot import Error
 from cdpr_tools.campaign.judge import Result, judge
-from cdpr_tools.campaign.play import STARTS, Player, RobotAtStart, output_to
+from cdpr_tools.campaign.play import STARTS, Played, Player, RobotAtStart, output_to
 from cdpr_tools.campaign.scenario import Scenario
 from cdpr_tools.processes import module_command
 
-_SEED_S: Final = 150.0
-"""Wall time after which a seed counts as hung."""
+_SEED_CPU_S: Final = 90
+"""Time of a processor after which a seed counts as hung."""
+_SEED_S: Final = 900.0
+"""The same by the wall clock, for a seed that waits."""
 _OUTPUT: Final = "output.txt"
 _AT_MOST: Final = 4000
 
@@ -136,28 +139,25 @@ def _fork_seed(scenario: Scenario, start: RobotAtStart, folder: Path) -> Result:
     own.mkdir()
 
     def play(out: int) -> None:
-        start.simulator.after_fork(own)
-        start.rig.folder = own
-        result = play_and_judge(scenario, start, own)
+        resource.setrlimit(resource.RLIMIT_CPU, (_SEED_CPU_S, _SEED_CPU_S + 5))
+        with output_to(own / _OUTPUT):
+            faulthandler.register(signal.SIGXCPU, file=2, chain=True)
+            start.simulator.after_fork(own)
+            start.rig.folder = own
+            result = _judged(Player(scenario, start).play(), start, own)
         result.cpu_s = round(time.process_time(), 3)  # a fork begins at 0
         _write(out, asdict(result))
 
-    lines = _in_fork(play, _SEED_S, own)
-    results = list(lines)
-    said = (own / _OUTPUT).read_text(errors="replace") if (own / _OUTPUT).exists() else ""
+    lines = _in_fork(play, _SEED_S)
+    found = [_result(data) for data in lines]
+    if not found:
+        said = (own / _OUTPUT).read_text(errors="replace")[-_AT_MOST:]
+        found = [Result(scenario.seed, scenario.robot, [f"crash: {lines.end}: {said}"])]
     shutil.rmtree(own, ignore_errors=True)
-    if results:
-        result = _result(results[0])
-    else:
-        why = f"crash: {lines.end}: {said[-_AT_MOST:]}"
-        result = Result(scenario.seed, scenario.robot, [why])
-    return result
+    return found[0]
 
 
-def play_and_judge(scenario: Scenario, start: RobotAtStart, folder: Path) -> Result:
-    """Play a scenario and judge it."""
-    with output_to(folder / _OUTPUT):
-        played = Player(scenario, start).play()
+def _judged(played: Played, start: RobotAtStart, folder: Path) -> Result:
     played.output = (folder / _OUTPUT).read_text(errors="replace")
     return judge(played, start.rig.robot)
 
@@ -168,7 +168,9 @@ def run_alone(scenario: Scenario, folder: Path, record: Path | None = None) -> R
     with start.rig:
         for where in STARTS[: STARTS.index(scenario.start) + 1]:
             start.advance(where)
-        return play_and_judge(scenario, start, folder)
+        with output_to(folder / _OUTPUT):
+            played = Player(scenario, start).play()
+        return _judged(played, start, folder)
 
 
 class _Lines:
@@ -194,39 +196,22 @@ class _Lines:
         self.end = f"exit status {status}" if ended else f"hung for {self._within_s:g} s"
 
 
-def _in_fork(work: Callable[[int], None], within_s: float, folder: Path | None = None) -> _Lines:
+def _in_fork(work: Callable[[int], None], within_s: float) -> _Lines:
     """Run `work` in a fork; it writes its results to a descriptor."""
     inner, outer = os.pipe()
     pid = os.fork()
     if not pid:
         os.close(inner)
-        _end_with(work, outer, within_s, folder)
+        status = 1
+        try:
+            work(outer)
+            status = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(status)  # without the cleanup of the parent
     os.close(outer)
     return _Lines(pid, inner, within_s)
-
-
-def _end_with(
-    work: Callable[[int], None], out: int, within_s: float, folder: Path | None
-) -> NoReturn:
-    """Do the work of a fork and end it without the cleanup of its parent."""
-    status = 1
-    try:
-        if folder is not None:
-            with (folder / _OUTPUT).open("a") as file:
-                faulthandler.dump_traceback_later(within_s - 5.0, file=file)
-                work(out)
-        else:
-            work(out)
-        status = 0
-    except BaseException:
-        text = traceback.format_exc()
-        if folder is not None:
-            with (folder / _OUTPUT).open("a") as file:
-                file.write(text)
-        else:
-            os.write(2, text.encode())
-    finally:
-        os._exit(status)
 
 
 def _write(out: int, data: dict[str, Any]) -> None:

@@ -7,6 +7,7 @@ import os
 import random
 import re
 import resource
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -388,13 +389,16 @@ def _memory_MB() -> float:
 
 @contextmanager
 def output_to(file: Path) -> Iterator[None]:
-    """Write everything that this process prints into a file."""
+    """Write what this process prints, and the traceback of an exception, into a file."""
     kept = [os.dup(1), os.dup(2)]
-    with file.open("wb") as out:
+    with file.open("ab") as out:
         for number in (1, 2):
             os.dup2(out.fileno(), number)
     try:
         yield
+    except Exception:
+        os.write(2, traceback.format_exc().encode())
+        raise
     finally:
         for number, old in enumerate(kept, 1):
             os.dup2(old, number)
