@@ -241,7 +241,7 @@ def _marked(text: str) -> str:
 
 
 def _references(schema: dict[str, Any]) -> list[str]:
-    found = [schema, *schema.get("anyOf", [])]
+    found = [schema, *schema.get("anyOf", []), *schema.get("oneOf", [])]
     return [one["$ref"].rpartition("/")[2] for one in found if "$ref" in one]
 
 

@@ -129,7 +129,7 @@ def _collect(
 ) -> None:
     """Take one image per second until there are `most`; take all if it is None."""
     clock = PacedClock()
-    with out.progress(source.name, float(most or 10)) as advance:
+    with out.progress(f"images from {source.name}", float(most or 10)) as advance:
         while most is None or len(images) < most:
             image = source.grab()
             if image is None:

@@ -75,7 +75,7 @@ def photos(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write images of a simulated camera from random poses, its intrinsics and its marker sheets.
+    """Write images of a simulated camera from random poses, and its intrinsics.
 
     The true intrinsics are written to camera.toml beside the images, and the sheets as they were
     ordered from the printer to markers.toml.
@@ -95,7 +95,7 @@ def photos(
     else:
         made = SimCamera(truth)
         images = (made.grab(state) for state in random_poses(box, count, seed))
-    with out.progress(f"{count} images", float(count)) as advance:
+    with out.progress(f"writing {count} images", float(count)) as advance:
         for k, pixels in enumerate(images):
             path = folder / f"image-{k:04d}.png"
             if not cv2.imwrite(str(path), pixels):

@@ -50,7 +50,7 @@ def _answered(request: Mapping[str, Any]) -> dict[str, Any]:
         typed, notes = answers_from(load_robot(request["present"]))
     form = _Form(typed)
     # profiles that the file names are searched where the file will be
-    answers = answers_of(_file(str(request.get("name") or "robot")), {}, form)
+    answers = answers_of(_file("robot"), {}, form)
     if "name" in request:
         return _saved(answers, form, str(request["name"]), replace=bool(request.get("replace")))
     text = text_of(answers)

@@ -82,7 +82,7 @@ function Geometry({ job, start }: Props) {
             <label>Poses <select value={count} onChange={(event) => setCount(Number(event.currentTarget.value))}>
               {COUNTS.map((one) => <option key={one} value={one}>{one === AUTO ? "as many as help" : one}</option>)}
             </select></label>
-            {hasCamera && <label class="check"><input type="checkbox" checked={camera} onChange={(event) => setCamera(event.currentTarget.checked)} /> <span>with the camera on the platform</span></label>}
+            {hasCamera && <label class="consent"><input type="checkbox" checked={camera} onChange={(event) => setCamera(event.currentTarget.checked)} /> <span>with the camera on the platform</span></label>}
           </div>
           <div class="row"><button class="go" disabled={!tight || busy || Boolean(inForce)} onClick={() => void start({ procedure: "measure", poses: count === AUTO ? null : count, camera })}>Measure</button></div>
         </li>
@@ -185,7 +185,7 @@ function Result({ title, good, text, children }: { title: string; good: boolean;
 }
 
 const Figures = ({ of }: { of: [string, string][] }) => (
-  <dl class="figures">{of.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
+  <dl class="key-figures">{of.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
 );
 
 const figure = (value: unknown, digits: number, unit: string, factor = 1): string => (typeof value === "number" ? `${(factor * value).toFixed(digits)} ${unit}` : "–");
@@ -208,6 +208,7 @@ function GeometryResult({ job, start }: { job: Job; start: Props["start"] }) {
   if (!found.verification) return null;
   const { verification: seen, change } = found;
   const measurement = String(job.values["measurement"]);
+  const advices = [...new Set(found.open.map(({ advice }) => advice))];
   const before = seen.mean_position_error_before_mm, after = seen.mean_position_error_mm;
   return (
     <Result title="Verdict" good={found.good} text={!found.good ? "The calibration is not good." : change.significant ? "The calibration is good." : "The calibration is good, but changes nothing significant."}>
@@ -221,10 +222,10 @@ function GeometryResult({ job, start }: { job: Job; start: Props["start"] }) {
       {found.faults.map(({ text }) => <p key={text} class="fault">{sentence(text)}</p>)}
       <Drawn job={job} about="errors at the poses" />
       <details><summary>Whole verdict</summary><ul>{found.verdict.map((one) => <li key={one}>{sentence(one)}</li>)}</ul></details>
-      {found.open.length > 0 && <><h3 class="next-steps">What to do next</h3><ul>{found.open.map(({ what, advice }) => <li key={what}>{sentence(what)} {sentence(advice)}</li>)}</ul></>}
+      {found.open.length > 0 && <><h3 class="next-steps">What to do next</h3><ul>{advices.map((advice) => <li key={advice}>{sentence(advice)} <small class="quiet">Not known without it: {found.open.filter((one) => one.advice === advice).map(({ what }) => what).join("; ")}.</small></li>)}</ul></>}
       {found.good && (
         <>
-          {!change.significant && <label class="check"><input type="checkbox" checked={anyway} onChange={(event) => setAnyway(event.currentTarget.checked)} /> <span>Adopt it although its changes are not significant.</span></label>}
+          {!change.significant && <label class="consent"><input type="checkbox" checked={anyway} onChange={(event) => setAnyway(event.currentTarget.checked)} /> <span>Adopt it although its changes are not significant.</span></label>}
           <div class="row"><button class="go" disabled={!change.significant && !anyway} onClick={() => void start({ procedure: "adopt", measurement, insignificant: anyway })}>Adopt</button></div>
         </>
       )}

@@ -30,8 +30,8 @@ export function Commission() {
             <li>
               <fieldset>
                 <legend>How thoroughly</legend>
-                <label class="check"><input type="radio" name="plan" checked={quick} onChange={() => setQuick(true)} /> <span>Quick: a rough result after about 4 min for each motor</span></label>
-                <label class="check"><input type="radio" name="plan" checked={!quick} onChange={() => setQuick(false)} /> <span>Thorough: about 20 min for each motor</span></label>
+                <label class="consent"><input type="radio" name="plan" checked={quick} onChange={() => setQuick(true)} /> <span>Quick: a rough result after about 4 min for each motor</span></label>
+                <label class="consent"><input type="radio" name="plan" checked={!quick} onChange={() => setQuick(false)} /> <span>Thorough: about 20 min for each motor</span></label>
               </fieldset>
             </li>
             <li>
@@ -43,7 +43,7 @@ export function Commission() {
             </li>
             <li>
               <h3>Detach the motors</h3>
-              <label class="check"><input type="checkbox" checked={detached} disabled={!chosen.length} onChange={(event) => setDetached(event.currentTarget.checked)} />
+              <label class="consent"><input type="checkbox" checked={detached} disabled={!chosen.length} onChange={(event) => setDetached(event.currentTarget.checked)} />
                 <span>The cables are off the drums, the {chosen.length > 1 ? "motors turn" : "motor turns"} freely, and nobody is near.</span></label>
             </li>
             <li>
@@ -70,7 +70,7 @@ function Choice({ description, axes, choose }: { description: Description; axes:
       <legend>Motors</legend>
       <div class="choice">
         {description.axes.map(({ name, motor }) => (
-          <label key={name} class="check">
+          <label key={name} class="consent">
             <input type="checkbox" checked={axes.includes(name)} onChange={(event) => choose(event.currentTarget.checked ? [...axes, name] : axes.filter((one) => one !== name))} />
             <span>{name} <small class="quiet">{motor}</small></span>
           </label>

@@ -112,10 +112,10 @@ function Present({ start }: { start: () => void }) {
 }
 
 function Form({ questions, answers, answer }: { questions: Question[]; answers: Answers; answer: (values: Answers) => void }) {
-  const set = (key: string, value: string): void => {
+  const set = (key: string, value: string | null): void => {
     const { [key]: _, ...others } = answers;
     if (key === "kind") answer(value ? { kind: value } : {}); // another kind has other points
-    else answer(value === "" ? others : { ...others, [key]: value });
+    else answer(value === null ? others : { ...others, [key]: value });
   };
   return (
     <>
@@ -146,20 +146,21 @@ const label = ({ key, text }: Question): string => {
   return point ? `Cable ${point[1]}` : text.replace(/ \(`cdpr.*\)$/, "").replace(/^Winches:.*/, "Winches");
 };
 
-function Field({ question, typed, set }: { question: Question; typed: string | undefined; set: (value: string) => void }) {
+function Field({ question, typed, set }: { question: Question; typed: string | undefined; set: (value: string | null) => void }) {
   const { key, problem, choices, origin } = question;
   const hint = `hint-${key}`;
   const shown = typed ?? question.value;
   const common = { id: `field-${key}`, value: shown, "aria-describedby": hint, "aria-invalid": problem !== "" };
   return (
-    <div class={`field ${problem ? "wrong" : typed === undefined ? "default" : "typed"}`}>
+    <div class={`field ${problem ? "wrong" : typed ? "typed" : "default"}`}>
       <label for={`field-${key}`}>{label(question)}</label>
       {choices.length > 0
         ? <select {...common} onChange={(event) => set(event.currentTarget.value)}>{choices.map((one) => <option key={one}>{one}</option>)}</select>
         : <input {...common} autocomplete="off" spellcheck={false} onInput={(event) => set(event.currentTarget.value)} />}
-      <small id={hint}>{problem || (typed !== undefined && typed !== question.default
-        ? <>changed <button class="plain" type="button" aria-label={`Use the default of ${label(question)}`} onClick={() => set("")}>use {question.default}</button></>
-        : origin && `default: ${origin}`)}</small>
+      <small id={hint}>
+        {problem || (typed && typed !== question.default ? "changed" : origin && `default: ${origin}`)}
+        {typed && typed !== question.default && <> <button class="plain" type="button" aria-label={`Use the default of ${label(question)}`} onClick={() => set(null)}>use {question.default}</button></>}
+      </small>
     </div>
   );
 }
@@ -213,7 +214,7 @@ function Diagnosis({ found, questions }: { found: Described | null; questions: Q
         </ul>
       )}
       {found && figures["held_share"] !== undefined && (
-        <dl class="figures">
+        <dl class="key-figures">
           <div><dt>Held in the box</dt><dd>{percent(figures["held_share"])}</dd></div>
           <div><dt>Accepted as targets</dt><dd>{percent(figures["target_share"])}</dd></div>
           <div><dt>Lowest resonance</dt><dd>{figures["lowest_resonance_Hz"]?.toFixed(0)} Hz</dd></div>
