@@ -14,6 +14,7 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from enum import Enum, IntFlag
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
@@ -28,6 +29,8 @@ _IN_ORDER = ("x86_64", "i686", "i386")
 # each 8 bytes: first the drive's own part, after its sequence number, then the inputs of others
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
 _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
+# faults that the drive's simulator injects into other devices
+_CELL_FAULT, _IO_FAULTS = 12, 13
 # then the tension history, a ring buffer of times and tensions, also written by the drive
 _SAMPLES, _SPACING_S = 512, 0.9e-3
 _RING = 16
@@ -40,6 +43,39 @@ _PAUSE_S = 5e-4
 
 Window = tuple[float, float]
 """Bus times at which a condition begins and ends."""
+
+
+class TensionFault(Enum):
+    """Faults that a simulated amplifier or its line can show; the values are their names."""
+
+    NONE = "mend"
+    OVER_RANGE = "over-range"
+    BROKEN_WIRE = "broken-wire"
+    SILENT = "silent"
+    TRUNCATED = "truncated"
+    WRONG_CRC = "wrong-crc"
+    WRONG_UNIT = "wrong-unit"
+
+
+class SafetyIoFault(IntFlag):
+    """Faults of a simulated safety I/O, register 1 of its panel."""
+
+    SILENT = 1
+    TRUNCATED = 2
+    WRONG_UNIT = 4
+    EXCEPTIONS = 8
+    CONTACTOR_WELDED = 16
+    FEEDBACK_STUCK = 32
+    """The contactor's feedback does not change."""
+    BRAKES_WORN = 64
+    """Brakes do not hold although their feedback reports applied."""
+    BRAKES_STUCK = 128
+    """Brakes and their feedback do not change."""
+    PRESSED = 256
+    """An emergency stop button is pressed; only by the physics board."""
+
+
+_CELL_FAULTS = tuple(TensionFault)
 
 
 class BoardState(NamedTuple):
@@ -200,6 +236,24 @@ class BoardAxis:
         """Return the next known bus time at which power or brake change."""
         changes = self._numbers[_POWER_FROM:_MASS]
         return min([at_s for at_s in changes if at_s > after_s], default=math.inf)
+
+    @property
+    def cell_fault(self) -> TensionFault:
+        """Fault of the cable's load cell; the drive writes it."""
+        return _CELL_FAULTS[self._words[_CELL_FAULT]]
+
+    @cell_fault.setter
+    def cell_fault(self, fault: TensionFault) -> None:
+        self._words[_CELL_FAULT] = _CELL_FAULTS.index(fault)
+
+    @property
+    def io_faults(self) -> SafetyIoFault:
+        """Faults of the safety I/O; the first axis' drive writes them."""
+        return SafetyIoFault(self._words[_IO_FAULTS])
+
+    @io_faults.setter
+    def io_faults(self, faults: SafetyIoFault) -> None:
+        self._words[_IO_FAULTS] = faults
 
     @property
     def hung_mass_kg(self) -> float:

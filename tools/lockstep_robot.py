@@ -490,14 +490,17 @@ class LockstepRobot:
         return self.block.rows[(written - 1) % self.block.capacity]
 
     def truth(self) -> Any:
-        """Return the truth at the last SYNC, a record of the pose log."""
-        assert self._truth is not None  # only for a robot with a platform
+        """Return the truth at the last SYNC, a record of the pose log.
+
+        Without a platform it lacks the pose. `simulator.truth()` shows more, also without a loop.
+        """
+        assert self._truth is not None  # opened with the robot
         return self._truth.last()
 
     @property
     def truth_log(self) -> Path:
         """The file of the pose log."""
-        assert self._truth_path is not None  # only for a robot with a platform
+        assert self._truth_path is not None  # opened with the robot
         return self._truth_path
 
     @property
@@ -549,7 +552,7 @@ class LockstepRobot:
         from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to load
 
         self._require_open()
-        if self._truth is None:
+        if self._truth is None or self.robot.platform is None:
             raise InvalidArgument(f"true_pose: {self._reference} {NO_PLATFORM}")
         true = self._truth.last()
         x, y, z, w = Rotation.from_matrix(true["rotation"]).as_quat(canonical=True)

@@ -430,9 +430,8 @@ class AxisGroup:
         self._end_cycling()
 
     def tolerate_silence(self, cycles: int) -> None:
-        """Tolerate this many consecutive cycles without an answer; in lockstep, none."""
-        if not self.lockstep:
-            self._ints[codec.SILENCE_LIMIT] = cycles + 1
+        """Tolerate this many consecutive cycles without an answer."""
+        self._ints[codec.SILENCE_LIMIT] = cycles + 1
 
     def request(self, state: State) -> None:
         """Request a state of all axes; the cycles lead them there step by step.

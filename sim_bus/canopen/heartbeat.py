@@ -34,6 +34,12 @@ class HeartbeatProducer:
         self._toggle = 0
         self._start(slave.od.get_int(0x1017, 0, 0))
 
+    def delay(self, by_s: float) -> None:
+        """Send the next heartbeat, and all that follow, this much later."""
+        if self._period_s:
+            self._next += by_s
+            self._timer.arm(self._next)
+
     def answer_guarding(self, _frame: bytes, _now: float) -> None:
         """Answer a remote request as a guarded node would, unless heartbeats are in use."""
         if self._period_s == 0.0:

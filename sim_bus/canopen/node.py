@@ -198,6 +198,10 @@ class CanopenSlave:
         """Clear a communication error; it stays active if the application has raised it too."""
         self._emcy.clear(code, emcy.COMMUNICATION)
 
+    def delay_heartbeat(self, by_s: float) -> None:
+        """Let the next heartbeat be late."""
+        self._heartbeat.delay(by_s)
+
     def set_nmt_state(self, state: NmtState) -> None:
         """Change the NMT state, by command or because of the application (6007h)."""
         if state == self.nmt_state:

@@ -10,7 +10,7 @@ from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
 from cdpr_sim_bus.canopen.od import Entry, ObjectDictionary, Value
 from cdpr_sim_bus.cia402.drive_quirks import DriveQuirks
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.cable_robot import MotorSample, RobotMember
+from cdpr_sim_bus.robot.cable_robot import CableRobot, MotorSample, RobotMember
 from cdpr_sim_bus.robot.motor import INDEX_FELL, INDEX_ROSE, restart_counter, run
 from cdpr_sim_bus.robot.motor_state import (
     MotorRatings,
@@ -23,6 +23,7 @@ from cdpr_sim_bus.robot.motor_state import (
 from cdpr_sim_bus.robot.plant import Plant
 
 _WINDOW_OFF = 0xFFFFFFFF
+_JAM_Nm = 1e6
 
 
 def to_int32(value: int) -> int:
@@ -71,6 +72,13 @@ class Axis:
         self.cable_cut = False
         self.slipped_m = 0.0
         """Length that fault injection has let slip through the cable's fastening."""
+        self.brake_applied = False
+        """Whether the safety I/O applies the brake."""
+        self.brake_fault = ""
+        """Injected fault: "worn" if the brake never holds, "stuck" if it always holds."""
+        self._index_missed = False
+        self.jammed = False
+        """Injected fault: whether the drum does not turn because its cable is caught."""
         self.position_offset = 0
         self._lowest, self._highest = -math.inf, math.inf
         self.clipped = False
@@ -134,15 +142,54 @@ class Axis:
         """Make the encoder miscount once; its index pulse stays at the same rotor angle."""
         self.motor["zero"] -= counts
 
+    def freeze_encoder(self, frozen: bool) -> None:
+        """Stop the encoder's counter; later it continues from there, so that counts are lost."""
+        m = self.motor
+        if frozen and not m["frozen"][0]:
+            m["frozen_count"] = self.sample[1]
+        elif m["frozen"][0] and not frozen:
+            m["zero"] = m["disc"] - m["frozen_count"]
+        m["frozen"] = frozen
+        self._update_index()
+
+    def miss_index(self, missed: bool) -> None:
+        """Let the encoder give no index pulse."""
+        self._index_missed = missed
+        self._update_index()
+
+    def _update_index(self) -> None:
+        present = self.plant.encoder.index_present and not self._index_missed
+        self.motor["index_present"] = present and not self.motor["frozen"][0]
+
+    def stick_torque(self, stuck: bool) -> None:
+        """Let the power stage keep its present torque while it is on."""
+        self.motor["torque_stuck"] = self.motor["torque_demand"] if stuck else math.nan
+
+    def jam(self, jammed: bool) -> None:
+        """Catch the cable at the drum, or release it."""
+        self.jammed = jammed
+        self.update_brake()
+
+    def break_brake(self, fault: str) -> None:
+        """Give the brake a fault, see `brake_fault`; "" repairs it."""
+        self.brake_fault = fault
+        self.update_brake()
+
+    def update_brake(self) -> None:
+        """Let the brake, or a caught cable, hold the rotor."""
+        holds = (self.brake_applied or self.brake_fault == "stuck") and self.brake_fault != "worn"
+        brake_Nm = self.plant.motor.brake_torque_Nm if holds else 0.0
+        self.motor["brake"] = _JAM_Nm if self.jammed else brake_Nm
+
+    @property
+    def body(self) -> CableRobot | None:
+        """The robot whose platform the cable moves."""
+        return None if self._robot is None else self._robot.robot
+
     @property
     def has_cable(self) -> bool:
         """Whether there is a cable."""
-        return self.has_platform or self.plant.load.kind != "none"
-
-    @property
-    def has_platform(self) -> bool:
-        """Whether the cable leads to a platform."""
-        return self._robot is not None
+        return self._robot is not None or self.plant.load.kind != "none"
 
     def cut_cable(self) -> None:
         """Cut the cable."""
@@ -170,19 +217,11 @@ class Axis:
 
     @property
     def cable_state(self) -> str:
-        """Return "none", "cut", "slipped" or "intact"."""
+        """Return "none", "cut", "caught", "slipped" or "intact"."""
         if not self.has_cable:
             return "none"
-        return "cut" if self.cable_cut else "slipped" if self.slipped_m else "intact"
-
-    def put_platform_back(self) -> None:
-        """Put the robot's platform at its start pose."""
-        if self._robot is not None:
-            self._robot.put_back()
-
-    def platform_truth(self) -> dict[str, list[float]] | None:
-        """Return the true pose and motion of the platform; None without one."""
-        return None if self._robot is None else self._robot.robot.truth()
+        states = {"cut": self.cable_cut, "caught": self.jammed, "slipped": self.slipped_m}
+        return next((name for name, holds in states.items() if holds), "intact")
 
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""

@@ -160,6 +160,7 @@ class SimDrive(SlaveApplication):
     def connect(self, board: BoardAxis) -> None:
         """Share the physics: write the truth to the board, read power and brake from it."""
         self._board = BoardLink(self.axis, self.state_machine, board)
+        self.fault_injection.board = board
 
     # -- LocalNode
 
@@ -360,8 +361,7 @@ class BoardLink:
         self._state_machine = state_machine
         self._board = board
         self._tension = axis.motor["winch_tension"]
-        self._brake_Nm = axis.plant.motor.brake_torque_Nm
-        self._released, self._power_on = True, False
+        self._power_on = False
         self._applied_s = axis.time
         self._mass_kg = axis.read("mass")
         board.hung_mass_kg = self._mass_kg
@@ -371,12 +371,12 @@ class BoardLink:
         """Apply power, brake and mass from the board at bus time `now_s`."""
         board = self._board
         self._applied_s = now_s
-        power, released = board.allows_power(now_s), board.releases_brake(now_s)
-        if power != self._state_machine.power_allowed:
+        power, applied = board.allows_power(now_s), not board.releases_brake(now_s)
+        if power != self._state_machine.power_input:
             self._state_machine.allow_power(power)
-        if released != self._released:
-            self._released = released
-            self._axis.motor["brake"] = 0.0 if self._released else self._brake_Nm
+        if applied != self._axis.brake_applied:
+            self._axis.brake_applied = applied
+            self._axis.update_brake()
         if board.hung_mass_kg != self._mass_kg:
             self._mass_kg = board.hung_mass_kg
             self._axis.motor["mass"] = self._mass_kg

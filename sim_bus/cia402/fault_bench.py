@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cdpr_sim_bus.cia402.drive import SimDrive
 
 _KEYS = ("fault", "axis", "value", "at_s")
+_LACKS = {"space": "platform in space", "board": "physics board"}
 
 
 @dataclass
@@ -46,6 +47,12 @@ class FaultBench:
         """Take orders on these buses, on which the drives are."""
         by_node = {id(node): hub for hub in hubs for node in hub.nodes}
         self._hubs = [by_node[id(drive)] for drive in self._drives]
+        for drive, hub in zip(self._drives, self._hubs, strict=True):
+            drive.fault_injection.mates = [
+                other.fault_injection
+                for other, its in zip(self._drives, self._hubs, strict=True)
+                if its is hub
+            ]
         for hub in hubs:
             hub.requests = {
                 "fault": self._order,
@@ -73,8 +80,8 @@ class FaultBench:
         if fault is not None:
             amount = self._amount(fault, value)
             injection = self._drives[places[0]].fault_injection
-            if not injection.has(fault.needs):
-                raise RequestError(f"{name}: the robot has no {fault.needs}")
+            if not injection.has(needs := fault.needs):
+                raise RequestError(f"{name}: the robot has no {_LACKS.get(needs, needs)}")
             self._hubs[places[0]].act(at_s, partial(injection.apply, fault, amount))
         elif value is not None:
             raise RequestError(f"{MEND}: takes no value")
@@ -142,6 +149,7 @@ class FaultBench:
         ]
 
     def _truth(self) -> dict[str, Any]:
+        body = self._drives[0].axis.body
         for record in self._records:  # some end without being mended
             injection = self._drives[(record.axis or 1) - 1].fault_injection
             if record.ended_s is None and record.fault not in injection.broken():
@@ -149,6 +157,6 @@ class FaultBench:
         return {
             "time_s": max(hub.now_s for hub in self._hubs),
             "drives": [drive.truth() for drive in self._drives],
-            "platform": self._drives[0].axis.platform_truth(),
+            "platform": None if body is None else body.truth(),
             "faults": [asdict(record) for record in self._records],
         }

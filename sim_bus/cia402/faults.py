@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import random
+import struct
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -12,7 +14,10 @@ from cdpr_sim_bus.canopen.node import CanopenSlave
 from cdpr_sim_bus.canopen.od import Value
 from cdpr_sim_bus.canopen.slave import NmtState
 from cdpr_sim_bus.cia402.state_machine import StateMachine
+from cdpr_sim_bus.cia402.words import ErrorCode, error_register_bits
 from cdpr_sim_bus.frame import pack_frame
+from cdpr_sim_bus.physics_board import BoardAxis, SafetyIoFault, TensionFault
+from cdpr_sim_bus.robot.cable_robot import CableRobot
 
 _REFUSE_MODES, _SHOW_MODE, _FALL_SILENT, _VANISH_IN_SDO = 3, 4, 6, 10
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
@@ -41,16 +46,14 @@ class Fault:
     sub: int = 0
     """Sub-index of 2F00h by which a master can inject it; 0 without one."""
     needs: str = ""
-    """What the drive must have: "cable" or "platform"."""
+    """What the robot must have: "cable", "platform", "space" (not in a plane), or a "board"."""
     lasts: bool = True
     """Whether it lasts until it is mended; the others happen once."""
     left: Callable[[FaultInjection], float] | None = None
     """Returns the present amount of a fault that may also end without `mend`."""
 
-    @property
-    def of_robot(self) -> bool:
-        """Whether it concerns the robot, not one axis."""
-        return self.needs == "platform"
+    of_robot: bool = False
+    """Whether it concerns the robot, not one axis."""
 
     def amount(self, value: float | None) -> float:
         """Return a valid amount, by default the usual one; raises ValueError."""
@@ -73,6 +76,9 @@ MEND: Final = "mend"
 """Order that ends all lasting faults of an axis, or of the robot."""
 CUT, SLIP, SILENCE, CELL_OFF = "cut-cable", "slip", "silence", "cell-off"
 _LOST, _DOUBLED, _LATE = "frames-lost", "frames-doubled", "frames-late"
+_CORRUPTED = "frames-corrupted"
+_COUNTED = (_LOST, _DOUBLED, _LATE, _CORRUPTED)
+_LONGEST_FRAME = 8
 
 
 class FaultInjection:
@@ -82,7 +88,7 @@ class FaultInjection:
         self.state_machine, self.slave = state_machine, slave
         self.axis = state_machine.axis
         self._od, self._outbox = self.axis.od, slave.outbox
-        self.counts = dict.fromkeys((_LOST, _DOUBLED, _LATE), 0)
+        self.counts = dict.fromkeys(_COUNTED, 0)
         """Remaining number of frames that each counted fault affects."""
         self.noted: Callable[[Fault, float], None] = lambda _fault, _amount: None
         """Called for each fault that is injected, with 0 when it is mended."""
@@ -92,6 +98,15 @@ class FaultInjection:
         self._muted = False
         self._babble = 0
         self._last_babble_ms = 0
+        self._absent: set[str] = set()
+        """Faults because of which the drive is not on the bus."""
+        self._twin = False
+        self._loss = 0.0
+        self._chance = random.Random(slave.node_id)
+        self.board: BoardAxis | None = None
+        """The physics board, for faults of other devices."""
+        self.mates: Sequence[FaultInjection] = (self,)
+        """The drives on the same bus."""
         self._silent_until = 0.0
         self._silence_ms = _FOR_GOOD_MS
         self.active = False
@@ -134,11 +149,16 @@ class FaultInjection:
 
     def has(self, needed: str) -> bool:
         """Return whether the drive has what a fault needs."""
-        return {"cable": self.axis.has_cable, "platform": self.axis.has_platform, "": True}[needed]
+        body = self.axis.body
+        if needed == "board":
+            return self.board is not None
+        if needed == "space":
+            return body is not None and not body.platform["planar"][0]
+        return self.axis.has_cable if needed == "cable" else not needed or body is not None
 
     def reset(self) -> None:
         """End the faults that a reset of the node ends."""
-        for name in (_LOST, _DOUBLED, _LATE, "no-heartbeat", "emcy-flood"):
+        for name in (*_COUNTED, "no-heartbeat", "emcy-flood"):
             if self._present.get(name):
                 self.apply(FAULTS[name], 0)
         self._late.clear()
@@ -163,6 +183,71 @@ class FaultInjection:
         self._silent_until = self.slave.now + (math.inf if ms == _FOR_GOOD_MS else ms * 1e-3)
         self._present[SILENCE] = ms
 
+    def set_absent(self, why: str, absent: object) -> None:
+        """Be on the bus, or not, because of a fault."""
+        (self._absent.add if absent else self._absent.discard)(why)
+        self._update_active()
+
+    def lose_supply(self, lost: float) -> None:
+        """Switch the drive off, or on again, as at power-up."""
+        self.set_absent("drive-off", lost)
+        if lost:
+            self.slave.set_nmt_state(NmtState.INITIALISING)
+            self.state_machine.restart()
+        else:
+            self.slave.reset_node()
+
+    def bus_off(self, off: float) -> None:
+        """Leave the bus, with the drive's reaction."""
+        self.set_absent("bus-off", off)
+        if off:
+            self.state_machine.abort_connection(ErrorCode.BUS_OFF)
+
+    def lose_bus(self, lost: float) -> None:
+        """Cut all drives off the bus."""
+        for mate in self.mates:
+            mate.set_absent("bus-lost", lost)
+
+    def lose_share(self, percent: float) -> None:
+        """Lose this share of the TPDOs."""
+        self._loss = percent / 100.0
+
+    def double(self, doubled: float) -> None:
+        """Let another device with the same node id boot and answer."""
+        self._twin = bool(doubled)
+        if doubled:
+            self._outbox.append(pack_frame(_ERROR_CONTROL + self.slave.node_id, b"\x00"))
+
+    def send_emcy(self, code: int) -> None:
+        """Send an emergency message."""
+        data = struct.pack("<HB5x", code, error_register_bits(code) | 1)
+        self._outbox.append(pack_frame(_EMCY + self.slave.node_id, data))
+
+    def ignore_commands(self, ignored: float) -> None:
+        """Ignore the controlword."""
+        self.state_machine.ignores_commands = bool(ignored)
+
+    def set_motor(self, field: str, value: float) -> None:
+        """Set a value of the motor's physics."""
+        self.axis.motor[field] = value
+
+    @property
+    def body(self) -> CableRobot:
+        """The robot with its platform."""
+        assert self.axis.body is not None  # the fault needs it
+        return self.axis.body
+
+    def break_cell(self, fault: TensionFault, broken: float) -> None:
+        """Give the load cell a fault, or mend it."""
+        assert self.board is not None  # the fault needs it
+        self.board.cell_fault = fault if broken else TensionFault.NONE
+
+    def break_io(self, fault: SafetyIoFault, broken: float) -> None:
+        """Give the safety I/O a fault, or mend that."""
+        assert self.board is not None  # the fault needs it
+        faults = self.board.io_faults
+        self.board.io_faults = faults | fault if broken else faults & ~fault
+
     def count(self, name: str, frames: int) -> None:
         """Set the number of frames that a counted fault affects."""
         self.counts[name] = frames
@@ -183,7 +268,7 @@ class FaultInjection:
 
     def is_silent(self, now: float) -> bool:
         """Return whether the drive neither receives nor sends at bus time `now`."""
-        return now < self._silent_until
+        return bool(self._absent) or now < self._silent_until
 
     def ends_silence(self, frame: bytes, node_id: int) -> bool:
         """End the silence if this frame writes 0 to 2F00h:6; return whether it does.
@@ -192,14 +277,14 @@ class FaultInjection:
         """
         kind = frame[_DATA_AT]
         zero = pack_frame(_SDO_REQUEST + node_id, bytes((kind,)) + _NO_SILENCE)
-        if kind & _EXPEDITED_MASK != _EXPEDITED or frame != zero:
+        if self._absent or kind & _EXPEDITED_MASK != _EXPEDITED or frame != zero:
             return False
         self.apply(FAULTS[SILENCE], 0)
         return True
 
     def alter_outbox(self, now: float) -> None:
         """Drop, delay, double or add frames of the outbox, as the active faults require."""
-        if now < self._silent_until:
+        if self.is_silent(now):
             self._outbox.clear()
             return
         self._do_babble(now)
@@ -222,14 +307,30 @@ class FaultInjection:
             if not self._answers_left:
                 self.apply(FAULTS[SILENCE], self._silence_ms)
         elif _is_tpdo(frame):
-            if self._consume(_LOST):
+            if self._consume(_LOST) or (self._loss and self._chance.random() < self._loss):
                 return
+            if self._consume(_CORRUPTED):
+                frame = self._with_wrong_bit(frame)
             if self._consume(_LATE):
                 self._late.append(frame)
                 return
             if self._consume(_DOUBLED):
                 self._outbox.append(frame)
         self._outbox.append(frame)
+        if self._twin and identifier & _FUNCTION == _ERROR_CONTROL:
+            state = bytes([NmtState.PRE_OPERATIONAL])
+            self._outbox.append(pack_frame(_ERROR_CONTROL + self.slave.node_id, state))
+        elif self._twin and identifier & _FUNCTION == _SDO_ANSWER:
+            self._outbox.append(frame)
+
+    def _with_wrong_bit(self, frame: bytes) -> bytes:
+        length = min(frame[4], _LONGEST_FRAME)
+        if not length:
+            return frame
+        bit = self._chance.randrange(8 * length)
+        data = bytearray(frame)
+        data[_DATA_AT + bit // 8] ^= 1 << bit % 8
+        return bytes(data)
 
     def _consume(self, name: str) -> bool:
         if not self.counts[name]:
@@ -252,7 +353,9 @@ class FaultInjection:
             or self._late
             or self._muted
             or self._babble
-            or self.slave.now < self._silent_until
+            or self._twin
+            or self._loss
+            or self.is_silent(self.slave.now)
         )
 
     # -- object 2F00h
@@ -292,33 +395,104 @@ def _is_tpdo(frame: bytes) -> bool:
 
 
 _TABLE = (
+    # the drive
+    Fault("drive-off", "loses its supply: no torque, no communication",
+          lambda f, v: f.lose_supply(v)),
+    Fault("drive-reboot", "restarts, as by a brown-out; its encoder counts from zero again",
+          lambda f, _: f.slave.reset_node(), lasts=False),
     Fault("drive-fault", "reports this fault and switches its power off",
           lambda f, v: f.state_machine.trip(v), 0x7305, 1, 0xFFFF, "code", sub=1, lasts=False),
+    Fault("power-lost", "loses the supply of its power stage, as by safe torque off",
+          lambda f, v: f.state_machine.lose_power(bool(v))),
     Fault("pre-operational", "goes to this NMT state: it ignores PDOs, and keeps its last torque",
           lambda f, _: f.slave.set_nmt_state(NmtState.PRE_OPERATIONAL), lasts=False),
+    Fault("nmt-stop", "goes to the NMT state stopped",
+          lambda f, _: f.slave.set_nmt_state(NmtState.STOPPED), lasts=False),
+    Fault("commands-ignored", "ignores the controlword", lambda f, v: f.ignore_commands(v)),
+    # the motor
+    Fault("torque-stuck", "keeps its present torque while its power is on",
+          lambda f, v: f.axis.stick_torque(bool(v))),
+    Fault("torque-bias", "gives this much more torque than it shows",
+          lambda f, v: f.set_motor("torque_bias", v), 0.5, -100.0, 100.0, "Nm"),
+    Fault("torque-limit", "gives no more than this torque",
+          lambda f, v: f.set_motor("torque_cap", v or math.inf), 0.3, 0.001, 100.0, "Nm"),
+    # the encoder
+    Fault("encoder-jump", "miscounts once; its index pulse stays",
+          lambda f, v: f.axis.jump(v), 500, -(2**31), 2**31 - 1, "counts", sub=11, lasts=False),
+    Fault("encoder-frozen", "does not count; `mend` lets it go on from there",
+          lambda f, v: f.axis.freeze_encoder(bool(v))),
+    Fault("encoder-noise", "shows noise of this standard deviation",
+          lambda f, v: f.set_motor("noise", v or f.axis.plant.encoder.noise_counts),
+          20.0, 0.1, 1e4, "counts"),
+    Fault("index-missed", "gives no index pulse", lambda f, v: f.axis.miss_index(bool(v))),
+    # the bus
     Fault(SILENCE, "neither receives nor sends; 65535: for good",
           lambda f, v: f.silence(v), _FOR_GOOD_MS, 1, _FOR_GOOD_MS, "ms", sub=6,
           left=lambda f: f.silence_ms),
-    Fault("encoder-jump", "miscounts once; its index pulse stays",
-          lambda f, v: f.axis.jump(v), 500, -(2**31), 2**31 - 1, "counts", sub=11, lasts=False),
+    Fault("bus-off", "leaves the bus and reacts as to a lost master", lambda f, v: f.bus_off(v)),
+    Fault("bus-lost", "loses the bus together with all drives on it",
+          lambda f, v: f.lose_bus(v)),
     Fault(_LOST, "does not send this many TPDOs", lambda f, v: f.count(_LOST, v),
           1, 1, 0xFF, "frames", sub=2, left=lambda f: f.counts[_LOST]),
+    Fault("frames-lossy", "does not send this share of its TPDOs, at random",
+          lambda f, v: f.lose_share(v), 10.0, 0.1, 100.0, "%"),
     Fault(_DOUBLED, "sends this many TPDOs twice", lambda f, v: f.count(_DOUBLED, v),
           1, 1, 0xFF, "frames", sub=7, left=lambda f: f.counts[_DOUBLED]),
     Fault(_LATE, "sends this many TPDOs only before the next one", lambda f, v: f.count(_LATE, v),
           1, 1, 0xFF, "frames", sub=8, left=lambda f: f.counts[_LATE]),
+    Fault(_CORRUPTED, "sends this many TPDOs with one wrong bit",
+          lambda f, v: f.count(_CORRUPTED, v), 1, 1, 0xFF, "frames",
+          left=lambda f: f.counts[_CORRUPTED]),
+    Fault("duplicate-node", "shares its node id with another device, which waits pre-operational",
+          lambda f, v: f.double(v)),
     Fault("no-heartbeat", "sends no heartbeat", lambda f, v: f.mute(v), sub=5),
+    Fault("heartbeat-late", "sends its next heartbeat this much later",
+          lambda f, v: f.slave.delay_heartbeat(v * 1e-3), 1000, 1, 60_000, "ms", lasts=False),
+    Fault("emcy", "sends an emergency message with this code, without a fault",
+          lambda f, v: f.send_emcy(v), 0xFF00, 1, 0xFFFF, "code", lasts=False),
     Fault("emcy-flood", "sends this many emergency messages every millisecond",
           lambda f, v: f.babble(v), 1, 1, 0xFF, "messages", sub=9),
+    # the cable
     Fault(CUT, "is cut", lambda f, v: f.axis.cut_cable() if v else f.axis.mend_cable(), sub=12,
           needs="cable", left=lambda f: f.axis.cable_cut),
     Fault(SLIP, "slips by this much through its fastening on the drum",
           lambda f, v: f.axis.slip_cable(v * 1e-3) if v else f.axis.mend_cable(),
           100, 1, 0xFFFF, "mm", sub=13, needs="cable", left=lambda f: f.slipped_mm),
+    Fault("caught-cable", "is caught at the drum, which cannot turn",
+          lambda f, v: f.axis.jam(bool(v)), needs="cable"),
     Fault(CELL_OFF, "shows this much more than the tension", lambda f, v: f.set_cell_off(v),
           40, -(2**15), 2**15 - 1, "N", sub=14, left=lambda f: round(f.axis.cell_off_N)),
-    Fault("put-back", "is carried back to its start", lambda f, _: f.axis.put_platform_back(),
-          sub=15, needs="platform", lasts=False),
+    Fault("cell-broken", "its load cell has a broken wire",
+          lambda f, v: f.break_cell(TensionFault.BROKEN_WIRE, v), needs="board"),
+    Fault("cell-silent", "its load cell does not answer",
+          lambda f, v: f.break_cell(TensionFault.SILENT, v), needs="board"),
+    # the platform
+    Fault("push-x", "is pushed along x", lambda f, v: f.body.push(0, v),
+          50.0, -1e5, 1e5, "N", needs="platform", of_robot=True),
+    Fault("push-y", "is pushed along y", lambda f, v: f.body.push(1, v),
+          50.0, -1e5, 1e5, "N", needs="platform", of_robot=True),
+    Fault("push-z", "is pushed along z", lambda f, v: f.body.push(2, v),
+          50.0, -1e5, 1e5, "N", needs="space", of_robot=True),
+    Fault("obstacle", "is held where it is, by an obstacle of this stiffness",
+          lambda f, v: f.body.block(v * 1e3), 50.0, 0.1, 1e3, "N/mm",
+          needs="platform", of_robot=True),
+    Fault("payload", "carries this mass more", lambda f, v: f.body.load(v),
+          2.0, 0.001, 1e5, "kg", needs="platform", of_robot=True),
+    Fault("put-back", "is carried back to its start", lambda f, _: f.body.put_back(),
+          sub=15, needs="platform", of_robot=True, lasts=False),
+    # the brake of a motor
+    Fault("brake-worn", "does not hold", lambda f, v: f.axis.break_brake("worn" if v else "")),
+    Fault("brake-stuck", "is always applied",
+          lambda f, v: f.axis.break_brake("stuck" if v else "")),
+    # the safety I/O
+    Fault("stop-pressed", "an emergency stop button is pressed",
+          lambda f, v: f.break_io(SafetyIoFault.PRESSED, v), needs="board", of_robot=True),
+    Fault("io-silent", "does not answer", lambda f, v: f.break_io(SafetyIoFault.SILENT, v),
+          needs="board", of_robot=True),
+    Fault("contactor-welded", "its contactor does not open",
+          lambda f, v: f.break_io(SafetyIoFault.CONTACTOR_WELDED, v), needs="board", of_robot=True),
+    Fault("feedback-stuck", "the feedback of its contactor does not change",
+          lambda f, v: f.break_io(SafetyIoFault.FEEDBACK_STUCK, v), needs="board", of_robot=True),
 )  # fmt: skip
 FAULTS: Final[Mapping[str, Fault]] = {fault.name: fault for fault in _TABLE}
 """All faults, by name."""

@@ -74,8 +74,13 @@ class StateMachine:
         """Fault injection: mode displayed instead of the real one; 0 for none."""
         self.configuration_changed = True
         """Whether limits, windows or ramps of the dictionary have changed."""
+        self.ignores_commands = False
+        """Fault injection: whether the controlword has no effect."""
         self.power_allowed = True
-        """Whether the safe-torque-off input enables the power stage."""
+        """Whether the power stage may be on."""
+        self.power_input = True
+        """Whether the safe-torque-off input enables it."""
+        self._power_lost = False
         self._slave = slave
         self._quirks = axis.quirks
         plant = axis.plant.drive
@@ -86,7 +91,7 @@ class StateMachine:
         self._error = od.entry(0x603F)
         self._supported = axis.quirks.supported_modes(od.get_int(0x6502))
         self.restart()
-        od.on_write(0x6040, 0, self.command)
+        od.on_write(0x6040, 0, self._receive_command)
         od.on_write(0x6060, 0, self.request_mode)
 
     def restart(self) -> None:
@@ -124,6 +129,10 @@ class StateMachine:
             if not self._halted:
                 self.mode.command(old, word)
         self.update()
+
+    def _receive_command(self, value: Value) -> None:
+        if not self.ignores_commands:
+            self.command(value)
 
     def _transition(self, word: int) -> None:
         """Make the transitions that a controlword commands in the present state."""
@@ -295,7 +304,8 @@ class StateMachine:
 
         Without power, an enabled drive goes to fault, and any other drive cannot become ready.
         """
-        self.power_allowed = allowed
+        self.power_input = allowed
+        self.power_allowed = allowed = allowed and not self._power_lost
         if allowed:
             self._transition(self.word)
         elif self.state in (State.READY_TO_SWITCH_ON, State.SWITCHED_ON):
@@ -306,6 +316,11 @@ class StateMachine:
         elif self.axis.kind != servo.OFF:
             self.trip(ErrorCode.CONTACTOR, severe=True)
         self.update()
+
+    def lose_power(self, lost: bool) -> None:
+        """Fault injection: lose the supply of the power stage, or get it back."""
+        self._power_lost = lost
+        self.allow_power(self.power_input)
 
     def _reset_fault(self) -> None:
         if self.axis.flags & LASTING:

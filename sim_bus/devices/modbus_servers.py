@@ -23,8 +23,9 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from cdpr_sim_bus.devices.sim_inclinometer import SimInclinometer
-from cdpr_sim_bus.devices.sim_load_cells import SimAmplifier, TensionFault
+from cdpr_sim_bus.devices.sim_load_cells import SimAmplifier
 from cdpr_sim_bus.errors import BusSetupError
+from cdpr_sim_bus.physics_board import TensionFault
 
 _STEP_S = 0.002
 _UNIT_AT = 6

@@ -12,10 +12,9 @@ from cdpr_profiles.tension_sensor import REGISTERS, AngleValue, Inclinometer
 from cdpr_sim_bus.devices.sim_load_cells import (
     HOLDING_CODES,
     AmplifierPlant,
-    TensionFault,
     registers_of,
 )
-from cdpr_sim_bus.physics_board import BoardPlatform
+from cdpr_sim_bus.physics_board import BoardPlatform, TensionFault
 
 _LEVEL = (0.0, 0.0, 1.0)
 

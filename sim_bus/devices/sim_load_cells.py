@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import random
 import struct
-from enum import Enum
 from typing import Annotated
 
 from pydantic import Field
@@ -13,7 +12,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from cdpr_profiles.tension_sensor import REGISTERS, RawValue, Sensor, TensionSensors
-from cdpr_sim_bus.physics_board import BoardAxis
+from cdpr_sim_bus.physics_board import BoardAxis, TensionFault
 from cdpr_sim_bus.plant_file import PlantFile
 
 HOLDING_CODES = (3, 6, 16, 22, 23)
@@ -41,18 +40,6 @@ class AmplifierPlant(PlantFile):
     """Standard deviation of the inclinometer's zeros."""
 
 
-class TensionFault(Enum):
-    """Faults that a simulated amplifier or its line can show; the values are their names."""
-
-    NONE = "mend"
-    OVER_RANGE = "over-range"
-    BROKEN_WIRE = "broken-wire"
-    SILENT = "silent"
-    TRUNCATED = "truncated"
-    WRONG_CRC = "wrong-crc"
-    WRONG_UNIT = "wrong-unit"
-
-
 class SimAmplifier:
     """One amplifier: follows the true tension of its cable and answers as `device`.
 
@@ -64,7 +51,7 @@ class SimAmplifier:
         self, profile: TensionSensors, sensor: Sensor, plant: AmplifierPlant, axis: BoardAxis
     ) -> None:
         self.unit = sensor.unit
-        self.fault = TensionFault.NONE
+        self._fault = TensionFault.NONE
         assert profile.amplifier is not None  # there are sensors
         self._map = profile.amplifier
         self._plant = plant
@@ -78,6 +65,17 @@ class SimAmplifier:
         self._samples, _ = axis.tension_history(0)
         span = self._map.highest_N - self._map.lowest_N
         self._quantum_N = span / 2.0**plant.bits
+
+    @property
+    def fault(self) -> TensionFault:
+        """The fault that was set here, or else that of the physics board."""
+        if self._fault is TensionFault.NONE:
+            return self._axis.cell_fault
+        return self._fault
+
+    @fault.setter
+    def fault(self, fault: TensionFault) -> None:
+        self._fault = fault
 
     def _follow(self) -> None:
         """Advance the filter to the present bus time."""

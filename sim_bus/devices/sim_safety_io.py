@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from enum import IntFlag
 from typing import Annotated
 
 from pydantic import Field
@@ -15,7 +14,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from cdpr_profiles.reader import Profile
 from cdpr_profiles.safety_io import DigitalInput, SafetyIoProfile
 from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
-from cdpr_sim_bus.physics_board import BoardAxis, Window
+from cdpr_sim_bus.physics_board import BoardAxis, SafetyIoFault, Window
 from cdpr_sim_bus.plant_file import PlantFile
 
 Delay = Annotated[float, Field(ge=0.0, le=10.0)]
@@ -42,22 +41,6 @@ class SafetyPlant(PlantFile):
 
 _ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _READ_COILS, _READ_INPUTS, _WRITE_COIL, _WRITE_COILS = 1, 2, 5, 15
-
-
-class SafetyIoFault(IntFlag):
-    """Register 1 of the panel: active faults."""
-
-    SILENT = 1
-    TRUNCATED = 2
-    WRONG_UNIT = 4
-    EXCEPTIONS = 8
-    CONTACTOR_WELDED = 16
-    FEEDBACK_STUCK = 32
-    """The contactor's feedback does not change."""
-    BRAKES_WORN = 64
-    """Brakes do not hold although their feedback reports applied."""
-    BRAKES_STUCK = 128
-    """Brakes and their feedback do not change."""
 
 
 class DelayedContact:
@@ -112,7 +95,8 @@ class SimSafetyIo:
         self._lockstep, self._clock = bus_time is not None, bus_time or time.monotonic
         self.line = AnswerFaults(profile.unit, lockstep=self._lockstep)
         self.fault = SafetyIoFault(0)
-        self._pressed = False
+        self._panel_faults = self._board_faults = SafetyIoFault(0)
+        self._panel_pressed = False
         self._coils = [False] * (1 + max(output.coil for _, output in profile.outputs()))
         self._contactor = DelayedContact(plant.contactor_close_s, plant.contactor_open_s)
         self._brakes = [
@@ -132,12 +116,21 @@ class SimSafetyIo:
 
     def _press(self, pressed: int) -> None:
         self.step()
-        self._pressed = bool(pressed)
+        self._panel_pressed = bool(pressed)
         self.step()
 
     def _set_faults(self, bits: int) -> None:
         self.step()
-        self.fault = SafetyIoFault(bits)
+        self._panel_faults = SafetyIoFault(bits)
+        self._apply_faults()
+        self.step()
+
+    @property
+    def _pressed(self) -> bool:
+        return self._panel_pressed or SafetyIoFault.PRESSED in self.fault
+
+    def _apply_faults(self) -> None:
+        self.fault = self._panel_faults | self._board_faults
         self._contactor.stuck = SafetyIoFault.CONTACTOR_WELDED in self.fault and self._contactor.on
         for brake in self._brakes:
             brake.stuck = SafetyIoFault.BRAKES_STUCK in self.fault
@@ -145,12 +138,14 @@ class SimSafetyIo:
         self.line.truncated = SafetyIoFault.TRUNCATED in self.fault
         self.line.wrong_unit = SafetyIoFault.WRONG_UNIT in self.fault
         self._stuck_feedback = self._contactor.on
-        self.step()
 
     # -- physics
 
     def step(self) -> None:
         """Advance contactor, brakes and inputs to now, and write them to the board."""
+        if self._board and self._board[0].io_faults != self._board_faults:
+            self._board_faults = self._board[0].io_faults
+            self._apply_faults()
         now, drop_s = self._clock(), self._watchdog_drop_s
         if now > drop_s:  # it accepts no outputs until its watchdog is fed again
             if not self._dropped:

@@ -33,6 +33,8 @@ from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 # Motors, cables and platform of one robot, advanced together (compiled).
 
+_STATE = ("position", "velocity", "rotation", "spin", "bent", "standing")
+"""Fields of a platform that say where it is."""
 _TIME, _RINGING, _DYING = 1e-12, 0.15, 0.4
 _MOST_STEPS = 400
 
@@ -319,9 +321,25 @@ class CableRobot:
             loose_m = min(loose_m, start_m)
         self.motors["cable_start"][i] = max(start_m - slipped_m, loose_m)
 
+    def push(self, k: int, newton: float) -> None:
+        """Push the platform's centre of mass along axis `k` of the room, from 0."""
+        self.platform["push"][0, k] = newton
+
+    def block(self, stiffness_N_m: float) -> None:
+        """Hold the centre of mass by an obstacle where it is; 0 removes the obstacle."""
+        self.platform["block_stiffness"] = stiffness_N_m
+        self.platform["block"] = self.platform["position"]
+
+    def load(self, kilogram: float) -> None:
+        """Put this mass at the platform's centre of mass, instead of any earlier one."""
+        p, before = self.platform[0], self._at_start[0]
+        p["mass"] = before["mass"] + kilogram
+        p["mobility"] = before["mobility"] - 1.0 / before["mass"] + 1.0 / p["mass"]
+
     def put_back(self) -> None:
         """Put the platform at rest at its start pose; cables that are too short get slack."""
-        self.platform[:] = self._at_start
+        for name in _STATE:
+            self.platform[name] = self._at_start[name]
         start_m = self.motors["cable_start"]
         for i in range(self.n):
             start_m[i] = max(float(start_m[i]), self._slack_start_m(i))
@@ -362,7 +380,3 @@ class RobotMember:
     def mend(self, cut: bool, slipped_m: float) -> None:
         """See `CableRobot.mend`."""
         self.robot.mend(self.number, cut, slipped_m)
-
-    def put_back(self) -> None:
-        """See `CableRobot.put_back`."""
-        self.robot.put_back()

@@ -63,6 +63,10 @@ def step_rotor(m: Any, h: float, demand: float, energised: bool) -> None:
     cogging *= 1.0 + m.cogging_per_K * m.rise
     offset = 0.0
     if energised:
+        offset -= m.torque_bias
+        if not math.isnan(m.torque_stuck):
+            demand = m.torque_stuck
+        demand = max(-m.torque_cap, min(m.torque_cap, demand))
         for k in range(m.n_torque, m.n_cogging):
             offset += m.amplitude[k] * math.sin(m.order[k] * m.angle + m.phase[k])
     # The loop controls the measured current to the demand; the true current lacks the sensors'
@@ -275,6 +279,8 @@ def restart_counter(motor: Any) -> None:
 @jit
 def read_counter(m: Any, angle: float) -> int:
     """Return the encoder counter for a rotor angle, with the disc's errors, noise and rounding."""
+    if m.frozen != 0:
+        return int(m.frozen_count)
     reading = angle * m.counts_per_rad
     if m.eccentricity > 0.0:
         reading += m.eccentricity * math.sin(angle + m.eccentric_phase) - m.eccentric_zero

@@ -50,6 +50,10 @@ _PHYSICS = [
     ("twelfth", _F8),
     ("rubbing", _F8),  # share of the dry friction that varies once a turn
     ("rubbing_phase", _F8),
+    # injected faults
+    ("torque_bias", _F8),  # Nm, at the nominal torque constant, that the sensors do not show
+    ("torque_cap", _F8),  # Nm, most that the power stage gives
+    ("torque_stuck", _F8),  # Nm, demand that it follows instead of the servo's; NaN: none
     # state
     ("time", _F8),  # s, bus time
     ("angle", _F8),  # rad, mechanical, over all turns
@@ -118,6 +122,8 @@ _ENCODER = [
     ("disc", np.int64),  # disc position now, noise-free
     ("index", np.int64),  # disc position of the index pulse
     ("index_present", np.int64),
+    ("frozen", np.int64),  # injected fault: 1 if the counter stays at `frozen_count`
+    ("frozen_count", np.int64),
     ("rise_count", np.int64),  # counter at the last rising edge of the index pulse
     ("fall_count", np.int64),
     ("slot", np.int64),
@@ -250,6 +256,7 @@ def _set_physics(m: Any, plant: Plant) -> None:
     m["ripple_order"] = 6.0 * plant.ripple.pole_pairs
     m["ripple_phase"] = math.radians(plant.ripple.phase_deg)
     m["sixth"], m["twelfth"] = plant.ripple.sixth, plant.ripple.twelfth
+    m["torque_cap"], m["torque_stuck"] = math.inf, math.nan
     m["current_rate"] = 2.0 * math.pi * plant.drive.current_loop_bandwidth_Hz
     m["coulomb"] = friction.coulomb_Nm
     m["breakaway"] = friction.breakaway_Nm

@@ -16,6 +16,8 @@ from cdpr_sim_bus.robot.robot_plant import FloorPlant, PlatformPlant, RobotPlant
 MOST_CABLES = 16
 MOST_FEET = 16
 _F8 = np.float64
+_BLOCK_s = 0.01
+"""Damping of an obstacle over its stiffness."""
 PLATFORM_DTYPE = np.dtype(
     [
         # parameters
@@ -40,6 +42,10 @@ PLATFORM_DTYPE = np.dtype(
         ("floor_damping", _F8),  # N s/m
         ("standing", np.int64),  # whether a foot touched the floor in the last step
         ("floor_friction", _F8),  # friction coefficient of a foot on the floor
+        # injected faults
+        ("push", _F8, (3,)),  # N, force on the centre of mass
+        ("block_stiffness", _F8),  # N/m, of a damped obstacle that holds the centre of mass; 0 none
+        ("block", _F8, (3,)),  # m, where it holds it
         # state
         ("position", _F8, (3,)),  # m, of the centre of mass
         ("velocity", _F8, (3,)),
@@ -135,6 +141,15 @@ def step_platform(p: Any, motors: Any, h: float) -> None:
     fx = p.mass * p.gravity[0] - p.air * p.velocity[0]
     fy = p.mass * p.gravity[1] - p.air * p.velocity[1]
     fz = p.mass * p.gravity[2] - p.air * p.velocity[2]
+    for k in range(3):
+        if p.push[k] != 0.0 or p.block_stiffness > 0.0:
+            stop = p.block_stiffness * (p.block[k] - p.position[k] - _BLOCK_s * p.velocity[k])
+            if k == 0:
+                fx += p.push[k] + stop
+            elif k == 1:
+                fy += p.push[k] + stop
+            else:
+                fz += p.push[k] + stop
     drag = p.air * p.reach * p.reach
     tx, ty, tz = -drag * p.spin[0], -drag * p.spin[1], -drag * p.spin[2]
     g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)

@@ -12,7 +12,7 @@ import errno
 import json
 import struct
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,9 @@ from cdpr_profiles.bounded_input import may_replace
 from cdpr_profiles.errors import printable
 from cdpr_profiles.jit import jit
 from cdpr_sim_bus.physics_board import BoardPlatform, PlatformState
+from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.motor_state import MotorArray
 from cdpr_sim_bus.robot.platform import rotation_of
 from cdpr_sim_bus.robot.robot_plant import ScannerPlant
 
@@ -145,6 +147,8 @@ class PoseLog(RecordFile):
             ("tension_N", "<f8", (n,)),
             ("motor_rad", "<f8", (n,)),
             ("torque_Nm", "<f8", (n,)),
+            ("motor_rad_s", "<f8", (n,)),
+            ("power_on", "<f8", (n,)),
         ]
         self._row = np.zeros(1, np.dtype(fields))
         self._bytes = self._row.view(np.uint8).data
@@ -176,6 +180,8 @@ def fill_record(
     tension: Any,
     angle: Any,
     torque: Any,
+    speed: Any,
+    power: Any,
 ) -> None:
     """Write pose, tensions and motors to a record; position and velocity refer to the origin."""
     p = platform[0]
@@ -197,6 +203,45 @@ def fill_record(
         tension[i] = m.winch_tension
         angle[i] = m.angle
         torque[i] = m.true_gain * m.current
+        speed[i] = m.velocity
+        power[i] = 0.0 if m.kind == servo.OFF else 1.0
+
+
+class MotorsLog(RecordFile):
+    """A pose log of motors without a platform: it has all but the pose."""
+
+    def __init__(self, path: Path, motors: Sequence[MotorArray]) -> None:
+        """Create the file; raises OSError."""
+        n = len(motors)
+        self._motors = motors
+        fields = [
+            ("sync_index", "<u4"),
+            ("time_s", "<f8"),
+            ("tension_N", "<f8", (n,)),
+            ("motor_rad", "<f8", (n,)),
+            ("torque_Nm", "<f8", (n,)),
+            ("motor_rad_s", "<f8", (n,)),
+            ("power_on", "<f8", (n,)),
+        ]
+        self._row = np.zeros(1, np.dtype(fields))
+        header = {
+            "format": "cdpr-rt pose log 1",
+            "record_bytes": self._row.itemsize,
+            "fields": fields,
+        }
+        super().__init__(path, header)
+
+    def append(self, sync_index: int, time_s: float, _truth: tuple[float, ...]) -> None:
+        """Append the true state of the motors."""
+        row = self._row[0]
+        row["sync_index"], row["time_s"] = sync_index, time_s
+        for i, motor in enumerate(self._motors):
+            m = motor[0]
+            row["tension_N"][i] = m["winch_tension"]
+            row["motor_rad"][i], row["motor_rad_s"][i] = m["angle"], m["velocity"]
+            row["torque_Nm"][i] = m["true_gain"] * m["current"]
+            row["power_on"][i] = m["kind"] != servo.OFF
+        self.write(self._row.tobytes())
 
 
 _SAME_TIME_S = 1e-9

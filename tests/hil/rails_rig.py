@@ -28,8 +28,7 @@ from cdpr_drivers.errors import DriverError
 from cdpr_profiles import load_winch
 from cdpr_profiles.places import SHIPPED
 from cdpr_sim_bus.devices.sim_rail import RailFault
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis
+from cdpr_sim_bus.physics_board import BoardAxis, SafetyIoFault
 from cdpr_tools.commands import rail as rail_commands
 
 M_PER_RAD = 0.02 / math.tau

@@ -32,8 +32,7 @@ from cdpr_drivers.modbus.safety_io import SafetyIoError
 from cdpr_drivers.rails.rail import Cia402RailAxis, ModbusRailAxis, RailError
 from cdpr_profiles.rail import load_rail
 from cdpr_sim_bus.devices.sim_rail import RailFault
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.physics_board import PhysicsBoard, SafetyIoFault
 from cdpr_tools import cli
 from cdpr_tools.commands import rail as rail_commands
 from cdpr_tools.errors import BAD_INPUT, BadInputError

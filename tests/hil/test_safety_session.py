@@ -25,8 +25,7 @@ from cdpr_drivers.errors import DriverError
 from cdpr_drivers.modbus.safety_io import SafetyIo
 from cdpr_profiles import load_winch
 from cdpr_rt.errors import ControlError
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard, SafetyIoFault
 from cdpr_tools.commands import drive as drive_commands
 from cdpr_tools.commands import io as io_commands
 from cdpr_tools.errors import BadInputError, WorkFailedError

@@ -19,8 +19,8 @@ from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.devices.modbus_servers import serve_units
 from cdpr_sim_bus.devices.sim_rail import SimRail
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault, SafetyPlant, SimSafetyIo
-from cdpr_sim_bus.physics_board import PhysicsBoard, common_time
+from cdpr_sim_bus.devices.sim_safety_io import SafetyPlant, SimSafetyIo
+from cdpr_sim_bus.physics_board import PhysicsBoard, SafetyIoFault, common_time
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_tools.commands.options import ExitWithStdinOption
 from cdpr_tools.errors import BadInputError, WorkFailedError

@@ -85,7 +85,9 @@ def fault(
     for one in axes:
         with fault_access(robot, one, urls[one.bus]) as access:
             if not shows:
-                lines.append(f"{one.name}: {named_fault(what).text(access.inject(what, value))}")
+                known = named_fault(what)
+                text = known.text(access.inject(what, value))
+                lines.append(text if known.of_robot else f"{one.name}: {text}")
                 continue
             found, code = access.injected(), access.fault_code()
             if what == MEND:

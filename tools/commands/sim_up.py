@@ -26,7 +26,7 @@ from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_sim_bus.robot.truth_log import BoardPose, PoseLog, PoseScanner
+from cdpr_sim_bus.robot.truth_log import BoardPose, MotorsLog, PoseLog, PoseScanner
 from cdpr_tools.commands.options import ExitWithStdinOption, RobotOrWinchArgument
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.robot_physics import physics_of
@@ -114,7 +114,7 @@ def up(
         body, plants = physics_of(profile, plant, detached)
         winches, urls = [axis.winch for axis in profile.axes], robot_urls(profile, bus)
         if body is None:
-            _refuse_platforms(truth_log, scanner, camera)
+            _refuse_platforms(scanner, camera)
         for name, url in urls.items():
             _require_simulated(f"{name}={url}", url)
     else:
@@ -129,7 +129,7 @@ def up(
         body, plants = None, [Plant.load_file(plant)] * nodes
         winches, urls = _numbered(profile, nodes, unconfigured), {"": _bus(bus)}
     with ExitStack() as stack:
-        own_log = truth_log if body is None else None
+        own_log = truth_log if isinstance(profile, Winch) else None
         drives = _drives(stack, winches, plants, body, store, own_log)
         shared = _shared_board(stack, board, camera, drives, lockstep)
         if body is not None:
@@ -138,6 +138,9 @@ def up(
             if camera is not None and shared is not None:
                 described = plant if "camera" in truth.model_fields_set else None
                 stack.callback(OwnCamera(camera, shared.path, described).stop)
+        elif truth_log is not None and isinstance(profile, Robot):
+            with os_error_as(BadInputError, f"--truth-log {truth_log}"):
+                drives[0].record_with(MotorsLog(truth_log, [one.axis.motor for one in drives]))
         bench = FaultBench(drives)
         log, text = _frame_log(frame_log), None if truth_log is None else str(truth_log)
         if isinstance(profile, Winch):
@@ -247,16 +250,11 @@ def _require_simulated(text: str, url: BusUrl) -> None:
         raise BadInputError(f"--bus {text}: simulated drives run on simbus:NAME or socketcan:IFACE")
 
 
-def _refuse_platforms(truth_log: Path | None, scanner: Path | None, camera: Path | None) -> None:
+def _refuse_platforms(scanner: Path | None, camera: Path | None) -> None:
     """Raise BadInputError for options that need a platform, which the robot lacks."""
-    robot = "a robot with its platform on the cables"
-    for option, path, whose in (
-        ("--truth-log", truth_log, f"a winch, or {robot}"),
-        ("--scanner", scanner, robot),
-        ("--camera", camera, robot),
-    ):
+    for option, path in (("--scanner", scanner), ("--camera", camera)):
         if path is not None:
-            raise BadInputError(f"{option}: for {whose}")
+            raise BadInputError(f"{option}: for a robot with its platform on the cables")
 
 
 def _record(

@@ -157,7 +157,8 @@ class RobotSimulator(ABC):
     bus: str
     folder: Path
     """Folder for temporary files, removed at the end."""
-    truth_log: Path | None
+    truth_log: Path
+    """The log of the true motion."""
     board: Path | None
 
     @abstractmethod
@@ -222,13 +223,11 @@ class LockstepSimulator(OwnSimulator, RobotSimulator):
         self._channel: SimulatorChannel | None = None
         self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
         self.folder = Path(self._temporary.name)
-        if truth_log is None and robot.platform is not None:
-            truth_log = self.folder / "truth.log"
-        self.truth_log = truth_log
+        self.truth_log: Path = truth_log or self.folder / "truth.log"
         self._robot = robot
         self.board = None if robot.tension_sensors is None else self.folder / "board"
         super().__init__(
-            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, truth_log),
+            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, self.truth_log),
             board=self.board,
             scanner=scanner,
             camera=camera,

@@ -17,8 +17,7 @@ from pymodbus.client import ModbusTcpClient
 from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.safety_io import SafetyIoProfile, load_safety_io
 from cdpr_rt.core.clock import PacedClock
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.physics_board import PhysicsBoard, SafetyIoFault
 
 CLOCK = PacedClock()
 """While this clock waits, the devices are polled."""

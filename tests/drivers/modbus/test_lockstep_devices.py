@@ -27,8 +27,7 @@ from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.rail import load_rail
 from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard, SafetyIoFault
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.drivers.modbus.safety_rig import (
     SafetyIoProcess,

@@ -15,8 +15,7 @@ from cdpr_drivers.modbus.channel import ModbusError
 from cdpr_drivers.modbus.safety_io import IoLink, SafetyIo, SafetyIoError
 from cdpr_drivers.robot.safety import trip_file
 from cdpr_profiles.safety_io import SafetyIoProfile
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard, SafetyIoFault
 from tests.drivers.modbus.safety_rig import CLOCK, SafetyIoProcess, io_device_on_board, wait_until
 
 TRIP_S = 0.4

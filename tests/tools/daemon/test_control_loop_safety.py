@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from cdpr_rt.core.states import LoopState
-from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
-from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard, SafetyIoFault
 from tests.drivers.modbus.safety_rig import (
     SafetyIoProcess,
     board_file,
