@@ -89,7 +89,11 @@ def obeys(rig: Rig) -> bool:
 
 
 def state(key: str, value: object) -> Callable[[Rig], bool]:
-    return lambda rig: bool(rig.drive.truth()[key] == value)
+    def matches(rig: Rig) -> bool:
+        rig.run(0.05)
+        return bool(rig.drive.truth()[key] == value)
+
+    return matches
 
 
 def absent(rig: Rig) -> bool:
@@ -154,6 +158,7 @@ def test_a_fault_of_a_drive_shows_until_it_is_mended(name: str) -> None:
         return
     injection.apply(fault, 0)
     assert injection.broken() == {}
+    rig.run(0.02)
     if name in ("drive-off", "bus-off"):  # it waits for its master
         rig.nmt(1)
     if name == "cut-cable":  # mended with its slack
