@@ -99,7 +99,7 @@ class FaultInjection:
         self._babble = 0
         self._last_babble_ms = 0
         self._absent: set[str] = set()
-        """Faults because of which the drive is not on the bus."""
+        """Faults that keep the drive off the bus."""
         self._twin = False
         self._loss = 0.0
         self._chance = random.Random(slave.node_id)

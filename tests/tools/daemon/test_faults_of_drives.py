@@ -25,7 +25,7 @@ from tests.cdpr_rt.service.recording_rig import stock_messages
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
-RAISE_FAULT, SHOW_MODE, MUTE, SILENT_MS, DOUBLE, BABBLE = 1, 4, 5, 6, 7, 9
+RAISE_FAULT, SHOW_MODE, MUTE, DOUBLE, BABBLE = 1, 4, 5, 7, 9
 AXIS = 1
 
 
@@ -49,7 +49,6 @@ def disabled_by_another(rig: LoopRig) -> None:
 KINDS: dict[str, Callable[[LoopRig], None]] = {
     "7305h": injected(RAISE_FAULT, 0x7305),
     "restarted": nmt(129),
-    "silent": injected(SILENT_MS, 200),
     "no_heartbeat": injected(MUTE, 1),
     "wrong_mode": injected(SHOW_MODE, 8),
     "left_enabled": disabled_by_another,
