@@ -40,6 +40,13 @@ def load_code(reference: str) -> Any:
         ) from error
 
 
+def require_file(reference: str) -> None:
+    """Raise CodeError if "FILE.py:NAME" names a file that cannot be read. This runs no code."""
+    home = reference.rpartition(":")[0]
+    if home.endswith(".py"):
+        _read(reference, Path(home))
+
+
 def load_registered(group: str) -> dict[str, Any]:
     """Load all objects that installed packages register in a group of entry points.
 

@@ -124,6 +124,11 @@ _ANGLES: Final = ("angle", "rx", "ry", "rz")
 _STANDING: Final = ("hold", "idle")
 _STANDS: Final = ("the path waits here", "stepped back")
 _AXIS_PROGRAMS: Final = ("jog", "pid", "sweep")
+_NEXT: Final = {
+    "ready": "call enable() first",
+    "fault": "remove its cause, then call acknowledge() and enable()",
+}
+"""What makes a motion possible, by the state that refuses it."""
 _LIKELY_mm: Final = 20.0
 """A refused position or distance above this, in m, has probably been given in mm."""
 _SETTLE_S: Final = 2.0
@@ -621,10 +626,15 @@ class Robot:
         except (Refused, InvalidArgument) as refused:
             self._started = before
             status = self._look()
-            if isinstance(refused, Refused) and status["reacting"] != "none":
+            if not isinstance(refused, Refused):
+                raise
+            if status["reacting"] != "none":
                 error = self._fault(status)  # the robot is stopping
                 if isinstance(error, Faulted):
                     raise error from None
+            if refused.code is RefusalCode.NOT_IN_STATE and status["state"] in _NEXT:
+                text = f"{refused.refusal}; {_NEXT[status['state']]}"
+                raise Refused(text, refused.refusal) from None
             raise
         if program in _STANDING:
             self._started = ""

@@ -49,6 +49,8 @@ def simulate(
     InvalidRobot, and Error if the drives do not get ready.
     """
     plant_file = None if plant is None else Path(plant)
+    if plant_file is not None and not plant_file.is_file():
+        raise InvalidArgument(f"plant: {plant_file}: no such file")
     try:
         with ExitStack() as stack, without_collection():
             simulator = LockstepSimulator(load_robot(robot), str(robot), plant_file)
@@ -61,6 +63,7 @@ def simulate(
             from cdpr_tools.composition.own_code import OwnCode  # noqa: PLC0415
             from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
 
+            _require_objects(controller, programs)
             if tension_distribution is not None:
                 checked_distribution("tension_distribution", tension_distribution)
             named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
@@ -79,3 +82,15 @@ def simulate(
         raise InvalidArgument(str(error)) from error
     except (CommandError, DriverError, ControlError) as error:
         raise Error(str(error)) from error
+
+
+def _require_objects(controller: object, programs: object) -> None:
+    """Raise InvalidArgument unless the user's controller and programs are what they should be."""
+    from cdpr_rt.platform.own_controller import Controller  # noqa: PLC0415  # see above
+
+    if controller is not None and not isinstance(controller, Controller):
+        raise InvalidArgument(
+            f"controller: {controller!r}; give an object of a class derived from cdpr_rt.Controller"
+        )
+    if not isinstance(programs, Sequence) or isinstance(programs, str):
+        raise InvalidArgument(f"programs: {programs!r}; give a list of programs")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,3 +162,19 @@ def test_tensions_are_limited_to_the_robots_bounds(planar_file: Path) -> None:
 def test_a_robot_without_a_platform_rejects_a_controller() -> None:
     with pytest.raises(cdpr.InvalidArgument, match="controller: bench-2 has no platform"):
         cdpr.simulate("bench-2", controller=PoseController())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"controller": PoseController}, "controller: .*give an object of a class derived from"),
+        ({"controller": "mine.py:Mine"}, "controller: 'mine.py:Mine'; give an object"),
+        ({"programs": cdpr.Program}, "programs: .*give a list"),
+        ({"plant": "missing.toml"}, "plant: missing.toml: no such file"),
+    ],
+)
+def test_an_argument_of_the_wrong_kind_is_rejected_by_name(
+    given: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(cdpr.InvalidArgument, match=message):
+        cdpr.simulate("planar-3", **given)

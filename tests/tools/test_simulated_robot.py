@@ -204,7 +204,7 @@ def test_wait_runs_exactly_the_requested_time(
 
 def test_a_drive_fault_ends_a_move_and_can_be_acknowledged() -> None:
     with cdpr.simulate("planar-3") as robot:
-        with pytest.raises(cdpr.Refused, match="not in state ready") as refused:
+        with pytest.raises(cdpr.Refused, match=r"call enable\(\) first") as refused:
             robot.move_to([0.0, 1.8])
         assert refused.value.code is RefusalCode.NOT_IN_STATE
         robot.enable()

@@ -499,7 +499,9 @@ class _DaemonProcess:
             if ready is None:
                 status = self._process.wait(_END_S)
                 text = self._last_error()
-                raise InvalidRobot(text) if status == BAD_INPUT else Error(text)
+                if status != BAD_INPUT:
+                    raise Error(text)
+                raise InvalidArgument(text) if text.startswith("--") else InvalidRobot(text)
             self.socket = Path(ready["socket"])
         except BaseException:
             with suppress(Error):
@@ -532,4 +534,5 @@ class _DaemonProcess:
     def _last_error(self) -> str:
         self._errors.seek(0)
         told = self._errors.read().decode(errors="replace").strip().splitlines()
-        return (told or ["the daemon ended"])[-1].removeprefix("cdpr: ")
+        causes = [line.removeprefix("cdpr: ") for line in told if "could not begin" not in line]
+        return (causes or told or ["the daemon ended"])[-1]

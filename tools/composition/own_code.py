@@ -8,7 +8,7 @@ from typing import Any
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import NO_PLATFORM
-from cdpr_rt.code_loader import load_code, load_registered
+from cdpr_rt.code_loader import load_code, load_registered, require_file
 from cdpr_rt.errors import ControlError
 from cdpr_rt.model.own_distribution import (
     TensionDistribution,
@@ -40,7 +40,7 @@ class OwnCodeOptions:
     programs: tuple[str, ...] = ()
 
     def require_use(self, robot: Robot, *, allow_code: bool) -> None:
-        """Raise BadInputError if the robot has no use for the code. This runs no code.
+        """Raise BadInputError if code is missing or the robot has no use for it; run no code.
 
         Raises ProfileError if the robot's file names code that is not allowed; `allow_code` allows
         it from now on.
@@ -48,10 +48,16 @@ class OwnCodeOptions:
         for option, reference in (
             ("--controller", self.controller),
             ("--tension-distribution", self.tension_distribution),
-            ("--program", self.programs[0] if self.programs else None),
+            *(("--program", program) for program in self.programs),
         ):
-            if reference is not None and robot.platform is None:
+            if reference is None:
+                continue
+            if robot.platform is None:
                 raise BadInputError(f"{option}: {robot.profile} {NO_PLATFORM}")
+            try:
+                require_file(reference)
+            except ControlError as error:
+                raise BadInputError(f"{option} {error}") from error
         if self.tension_distribution is None:
             require_code_allowed(robot, allow_code=allow_code)
 
