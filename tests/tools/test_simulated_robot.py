@@ -110,7 +110,7 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
     ):
         with pytest.raises(cdpr.InvalidArgument, match=message):
             robot.move_to(target)
-    with pytest.raises(cdpr.InvalidArgument, match=r"rotation_rad: .* has none"):
+    with pytest.raises(cdpr.InvalidArgument, match=r"rotation_rad: .* has no controlled angle"):
         robot.move_to([0.0, 1.8], [0.1])
     with pytest.raises(cdpr.InvalidArgument, match=r"speed_m_s: -1\.0; allowed: a finite number"):
         robot.move_to([0.0, 1.8], speed_m_s=-1.0)
@@ -219,7 +219,7 @@ def test_a_drive_fault_ends_a_move_and_can_be_acknowledged() -> None:
         robot.acknowledge()
         assert robot.state == "ready"
         robot.enable()
-        with pytest.raises(cdpr.InvalidArgument, match="FAULT 'rust'; allowed: cut-cable"):
+        with pytest.raises(cdpr.InvalidArgument, match="fault 'rust'; allowed: "):
             robot.inject_fault(0, "rust")
         robot.shut_down()
         with pytest.raises(cdpr.NotRunning, match="the simulation has ended"):
