@@ -265,7 +265,8 @@ def main() -> None:
         _end(_with_help(text, getattr(error, "ctx", None)), BAD_INPUT)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
         notes = getattr(error, "__notes__", ())
-        _end("; ".join([str(error), *notes]), exit_status(error))
+        figures = getattr(error, "figures", {})
+        _end("; ".join([str(error), *notes]), exit_status(error), figures)
     except ModuleNotFoundError as error:
         if not error.name or error.name.startswith("cdpr_"):
             raise
@@ -289,7 +290,7 @@ def _with_help(text: str, context: Any) -> str:
     return f"{text}; see `{context.command_path} --help`"
 
 
-def _end(message: str, status: int) -> NoReturn:
+def _end(message: str, status: int, figures: dict[str, Any] | None = None) -> NoReturn:
     message = message if len(message) <= _MOST_CHARS else f"{message[:_MOST_CHARS]}..."
     text = f"cdpr: {printable(message)}"
     if sys.stderr.isatty():
@@ -299,7 +300,7 @@ def _end(message: str, status: int) -> NoReturn:
     print(text, file=sys.stderr)
     if "--json" in sys.argv:
         with suppress(OutputLostError, BrokenPipeError):
-            result = {"ok": False, "error": message, "exit_status": status}
+            result = {**(figures or {}), "ok": False, "error": message, "exit_status": status}
             print(json.dumps(result), flush=True)
     sys.exit(status)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -10,6 +11,11 @@ class CommandError(Exception):
     """A command ends early; `exit_status` is for the shell, the message for the user."""
 
     exit_status = FAILED
+
+    def __init__(self, text: str, /, **figures: Any) -> None:
+        super().__init__(text)
+        self.figures = figures
+        """Shown with --json, beside the text."""
 
 
 class WorkFailedError(CommandError):

@@ -351,6 +351,13 @@ class Planned(_Answer):
     """Why the robot cannot follow it, with the first place by line and coordinates."""
     plan: str | None
     """The name of the plan for the program `path`."""
+    route_m: list[list[float]] | None = None
+    """Positions at even distances along the path, also if the robot cannot follow it."""
+    duration_s: float | None = None
+    length_m: float | None = None
+    next_line: int | None = None
+    """The line with which the next plan begins, null if this one ends the path."""
+    notices: list[str] = []
 
 
 class ProcedureStep(_Answer):

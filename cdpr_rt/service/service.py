@@ -100,7 +100,8 @@ def _read(status: int, text: str) -> dict[str, Any]:
     if not isinstance(answer, dict):
         return {"error": f"planning ended with status {status}: out of memory? divide the path"}
     if status:
-        return {"error": brief(str(answer.get("error", "refused")), _MOST_CHARS)}
+        error = {"error": brief(str(answer.get("error", "refused")), _MOST_CHARS)}
+        return error | {key: answer[key] for key in ("route_m", "obstacle") if key in answer}
     return answer
 
 

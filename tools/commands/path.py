@@ -261,7 +261,7 @@ def _preview(robot: Robot, path: PathFile, out: Output, picture: Path | None, ke
             draw_path(shown, robot, picture)
         out.say(f"picture: {picture}")
     if wrong := previews.obstacle_text(shown):
-        raise BadInputError(wrong)
+        raise BadInputError(wrong, **preview_figures)
     if keep:
         preview_figures["plan"] = previews.keep(shown, robot)
     out.result({"ok": True, **preview_figures})

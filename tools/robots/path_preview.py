@@ -40,6 +40,8 @@ from cdpr_tools.report.style import (
 )
 from cdpr_tools.robots.path_options import PathOptions
 
+_ROUTE_POINTS: Final = 1500
+
 
 @dataclass(frozen=True)
 class Preview:
@@ -100,6 +102,7 @@ def figures(shown: Preview) -> dict[str, Any]:
         "next_line": plan.next_line,
         "obstacle": None,
     }
+    table["route_m"] = _route(shown)
     if shown.obstacle is not None:
         k = shown.planner.model.positions
         table["obstacle"] = {
@@ -126,6 +129,17 @@ def figures(shown: Preview) -> dict[str, Any]:
     if shown.note:
         table["note"] = shown.note
     return table
+
+
+def _route(shown: Preview) -> list[list[float]]:
+    """Return positions at even distances along the path, for drawing it."""
+    nodes, k = shown.plan.nodes, shown.planner.model.positions
+    last = len(nodes.s) - 1
+    at = np.linspace(0.0, nodes.s[-1], min(_ROUTE_POINTS, 2 * last + 2))
+    return [
+        [round(float(x), 4) for x in point]
+        for point in np.stack([np.interp(at, nodes.s, nodes.q[:, i]) for i in range(k)], axis=1)
+    ]
 
 
 def _top_speed(shown: Preview) -> float:

@@ -1,7 +1,7 @@
 // What acts: the stop, the next step, moves and jogging.
 import { useEffect, useState } from "preact/hooks";
-import { type Platform, clientName, command, hasKey, request, setKey } from "./daemon";
-import { STEP_LABELS, type Situation, type Step, progressOf, situationOf } from "./situation";
+import { clientName, command, hasKey, request, setKey } from "./daemon";
+import { STEP_LABELS, type Situation, type Step, situationOf } from "./situation";
 import { store, useStore } from "./store";
 
 const stop = (): void => {
@@ -138,116 +138,5 @@ export function Simulation() {
         <button onClick={() => void store.attempt(() => inject("put-back", 0))} title="Carry a fallen platform back to its stand">Put the platform back</button>
       </div>
     </section>
-  );
-}
-
-const STEPS_MM = [1, 10, 100];
-const STEPS_DEG = [0.5, 2, 5];
-const RAD = Math.PI / 180;
-
-export function Move() {
-  const { description, status, right } = useStore();
-  const platform = description?.platform;
-  if (!platform || !status || !hasKey()) return null;
-  const tight = status.state === "active" && progressOf(status).tight !== false;
-  const holder = status.control.held && !right.held ? status.control.client : null;
-  return (
-    <section class="card" aria-labelledby="move">
-      <h2 id="move">Move</h2>
-      {!tight && <p class="quiet">The platform can move once the power is on and the cables are tight.</p>}
-      {holder && <p class="quiet">{holder} has the right to move.</p>}
-      <fieldset disabled={!tight || holder !== null}>
-        <legend class="hidden">Move the platform</legend>
-        <Target platform={platform} />
-        <Jog platform={platform} />
-        <div class="row">
-          <button onClick={() => void store.attempt(() => right.program("lower"))} title="Move home and down onto the stand">Lower</button>
-          {right.held && <button class="plain" onClick={() => right.release()}>Give up the right to move</button>}
-        </div>
-      </fieldset>
-    </section>
-  );
-}
-
-const positions = (platform: Platform): string[] => platform.controlled.filter((name) => name.length === 1);
-const angles = (platform: Platform): string[] => platform.controlled.filter((name) => name.length > 1);
-
-function Target({ platform }: { platform: Platform }) {
-  const names = [...positions(platform), ...angles(platform)];
-  const count = positions(platform).length;
-  const middle = platform.workspace_min_m.map((low, axis) => Math.round(500 * (low + platform.workspace_max_m[axis]!)));
-  const [typed, setTyped] = useState<string[]>(() => names.map((_, number) => String(number < count ? middle[number] : 0)));
-  const numbers = typed.map(Number);
-  const valid = typed.every((text, number) => text.trim() !== "" && Number.isFinite(numbers[number]));
-  const target = { position_m: numbers.slice(0, count).map((one) => one / 1e3), rotation_rad: numbers.slice(count).map((one) => one * RAD) };
-  const bounds = (number: number): [number, number] => number < count
-    ? [1e3 * platform.workspace_min_m[number]!, 1e3 * platform.workspace_max_m[number]!]
-    : [-platform.workspace_angle_rad / RAD, platform.workspace_angle_rad / RAD];
-  const show = (numbers: string[]): void => {
-    setTyped(numbers);
-    const values = numbers.map(Number);
-    store.change({ preview: values.every(Number.isFinite) ? { position_m: values.slice(0, count).map((one) => one / 1e3), rotation_rad: values.slice(count).map((one) => one * RAD) } : null });
-  };
-  const go = (): void => {
-    store.change({ preview: null });
-    const wanted = target.rotation_rad.length ? target : { position_m: target.position_m };
-    void store.attempt(() => store.right.program("pose", wanted));
-  };
-  const named = Object.entries(platform.poses_m);
-  return (
-    <form onSubmit={(event) => { event.preventDefault(); if (valid) go(); }}>
-      <div class="target" onFocusCapture={() => show(typed)} onBlurCapture={() => store.change({ preview: null })}>
-        {names.map((name, number) => {
-          const [low, high] = bounds(number);
-          return (
-            <label key={name}>
-              <span>{name}, {number < count ? "mm" : "deg"}</span>
-              <input inputMode="decimal" value={typed[number]} aria-describedby={`range-${name}`}
-                onInput={(event) => show(typed.map((text, one) => (one === number ? event.currentTarget.value : text)))} />
-              <small id={`range-${name}`}>{low.toFixed(0)} to {high.toFixed(0)}</small>
-            </label>
-          );
-        })}
-      </div>
-      <div class="row">
-        <button class="go" disabled={!valid}>Go</button>
-        {named.map(([name, at]) => (
-          <button key={name} type="button" onClick={() => show([...at.map((one) => String(Math.round(1e3 * one))), ...typed.slice(count)])}>{name}</button>
-        ))}
-      </div>
-    </form>
-  );
-}
-
-function Jog({ platform }: { platform: Platform }) {
-  const [size, setSize] = useState(1);
-  const [frame, setFrame] = useState<"room" | "platform">("room");
-  const names = positions(platform), turns = angles(platform);
-  const jog = (key: "distance_m" | "turn_rad", count: number, number: number, step: number): void => {
-    const wanted = Array.from({ length: count }, (_, one) => (one === number ? step : 0));
-    void store.attempt(() => store.right.program("pose", { [key]: wanted, frame }));
-  };
-  const pair = (name: string, key: "distance_m" | "turn_rad", count: number, number: number, step: number, words: string) => (
-    <div class="jog" key={name}>
-      <button type="button" aria-label={`${name} minus ${words}`} onClick={() => jog(key, count, number, -step)}>−</button>
-      <span>{name}</span>
-      <button type="button" aria-label={`${name} plus ${words}`} onClick={() => jog(key, count, number, step)}>+</button>
-    </div>
-  );
-  return (
-    <div class="jogging">
-      <div class="row">
-        <label>Step <select value={size} onChange={(event) => setSize(Number(event.currentTarget.value))}>
-          {STEPS_MM.map((one, number) => <option key={one} value={number}>{one} mm{turns.length ? `, ${STEPS_DEG[number]} deg` : ""}</option>)}
-        </select></label>
-        {turns.length > 0 && <label>along <select value={frame} onChange={(event) => setFrame(event.currentTarget.value as "room" | "platform")}>
-          <option value="room">the room's axes</option><option value="platform">the platform's axes</option>
-        </select></label>}
-      </div>
-      <div class="row">
-        {names.map((name, number) => pair(name, "distance_m", names.length, number, STEPS_MM[size]! / 1e3, `${STEPS_MM[size]} mm`))}
-        {turns.map((name, number) => pair(name, "turn_rad", turns.length, number, STEPS_DEG[size]! * RAD, `${STEPS_DEG[size]} deg`))}
-      </div>
-    </div>
   );
 }

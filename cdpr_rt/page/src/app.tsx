@@ -1,7 +1,7 @@
 // The operator's page.
 import { type ComponentType, render } from "preact";
 import { useEffect } from "preact/hooks";
-import { Move, NextStep, PowerOff, RejectedMessage, Simulation, StopButton, useSituation } from "./act";
+import { NextStep, PowerOff, RejectedMessage, Simulation, StopButton, useSituation } from "./act";
 import { linkTo, useView } from "./address";
 import { Calibrate } from "./calibrate";
 import { Commission } from "./commission";
@@ -12,6 +12,8 @@ import { Drives } from "./drives";
 import { Recordings } from "./recordings";
 import { Scope } from "./scope";
 import { useStore } from "./store";
+import { Move } from "./move";
+import { Path } from "./path";
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
 
@@ -46,13 +48,14 @@ function Robot() {
         <RobotView />
         <Trends />
         <Axes />
+        <Simulation />
       </div>
       <div class="column">
         <Move />
+        <Path />
         <Tensions />
         <Events />
         <Recording />
-        <Simulation />
       </div>
     </div>
   );

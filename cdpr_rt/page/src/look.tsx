@@ -1,14 +1,18 @@
 // What is only looked at: the robot, tensions, curves, events, axes.
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
-import { type Cycle, type Description } from "./daemon";
+import { type Cycle, type Description, hasKey } from "./daemon";
+import { anglesOf, go, positionsOf, presentPose, targetOf, useHindrance } from "./move";
 import { RobotScene, tensionColour } from "./scene";
 import { progressOf } from "./situation";
 import { store, useCycles, useStore } from "./store";
 import { type Curve, SPAN_S, Trend, curveColour } from "./trend";
 
+const RAD = Math.PI / 180;
+
 export function RobotView() {
-  const { description, status, preview } = useStore();
+  const { description, status, target, path } = useStore();
+  const [turns, setTurns] = useState(false);
   const host = useRef<HTMLDivElement>(null);
   const scene = useRef<RobotScene | null>(null);
   useEffect(() => {
@@ -21,19 +25,40 @@ export function RobotView() {
   }, []);
   useEffect(() => {
     if (description) scene.current?.describe(description);
+    store.recent.slice(-1).forEach((cycle) => scene.current?.show(cycle));
   }, [description]);
   useCycles((cycle) => scene.current?.show(cycle), []);
   const progress = status && progressOf(status);
   const moving = progress?.target_m && (progress.done ?? 1) < 1;
+  const platform = description?.platform;
+  const wanted = platform && target ? targetOf(platform, target) : null;
   useEffect(() => {
-    if (preview) scene.current?.aim(preview.position_m, preview.rotation_rad);
-    else if (moving) scene.current?.aim(progress!.target_m!, progress!.target_rotation_rad ?? null);
-    else scene.current?.aim(null, null);
-  }, [preview, moving, String(progress?.target_m)]);
+    if (wanted) scene.current?.aim(wanted.position_m, wanted.rotation_rad);
+    else if (!target) scene.current?.aim(moving ? progress!.target_m! : null, progress?.target_rotation_rad ?? null);
+  }, [String(target), moving, String(progress?.target_m)]);
+  const free = useHindrance() === "";
+  useEffect(() => {
+    if (platform && target) scene.current?.drag(turns ? "turn" : "move", (position_m, rotation_rad) =>
+      store.change({ target: [...position_m.map((one) => (1e3 * one).toFixed(0)), ...rotation_rad.map((one) => (one / RAD).toFixed(1))] }));
+    else scene.current?.drag(null);
+  }, [target === null, turns, description]);
+  const under = progress?.path;
+  const mine = path && !path.planning && (!under || under.plan === path.plan || status?.program !== "path") ? path : null;
+  useEffect(() => scene.current?.route(mine?.route_m ?? null, (mine?.obstacle as { position_m: number[] } | null | undefined)?.position_m ?? null), [mine, description]);
+  const share = mine && under?.plan === mine.plan ? under!.along_m / Math.max(under!.length_m, 1e-9) : 0;
+  useEffect(() => scene.current?.done(share), [share, mine]);
   return (
     <section class="card robot" aria-label="The robot in three dimensions">
       <div class="scene" ref={host} />
       <Place />
+      {platform && hasKey() && free && (
+        <div class="overlay">
+          {!target && <button onClick={() => store.change({ target: presentPose(platform) })} title="Drag the arrows of the outline to where the platform is to go">Drag a target</button>}
+          {target && anglesOf(platform).length > 0 && <button aria-pressed={turns} onClick={() => setTurns(!turns)}>Turn</button>}
+          {target && <button class="go" disabled={!wanted} onClick={() => go(platform)}>Go there</button>}
+          {target && <button onClick={() => store.change({ target: null })}>Discard the target</button>}
+        </div>
+      )}
     </section>
   );
 }
@@ -44,7 +69,7 @@ const mm = (value: number | null | undefined): string => (value == null ? "–" 
 function Place() {
   const { description } = useStore();
   const text = useRef<HTMLOutputElement>(null);
-  const names = (description?.platform?.controlled ?? []).filter((name) => name.length === 1);
+  const names = description?.platform ? positionsOf(description.platform) : [];
   useCycles((cycle) => {
     if (!text.current) return;
     const known = cycle.pose[0] != null;
@@ -60,12 +85,19 @@ export function Tensions() {
   if (!description) return null;
   return (
     <section class="card" aria-labelledby="tensions">
-      <h2 id="tensions">Cable tensions</h2>
+      <h2 id="tensions">Cable tensions <Origin /></h2>
       <ul class="tensions">
         {description.axes.map((axis, number) => <Tension key={axis.name} number={number} name={axis.name} limits={description.limits} />)}
       </ul>
     </section>
   );
+}
+
+/** Whether all tensions are estimated or measured; single ones say so by their `~`. */
+function Origin() {
+  const [text, setText] = useState("");
+  useCycles(({ tension_measured: measured }) => setText(measured.every(Boolean) ? "measured" : measured.some(Boolean) ? "~ estimated" : "estimated from the motors"), []);
+  return <span class="origin">{text}</span>;
 }
 
 function Tension({ number, name, limits }: { number: number; name: string; limits: Description["limits"] }) {
@@ -102,6 +134,8 @@ const distance_mm = ({ pose, pose_setpoint }: Cycle): number | null => {
   return 1e3 * Math.hypot(...[0, 1, 2].map((axis) => (pose[axis] ?? 0) - (pose_setpoint[axis] ?? 0)));
 };
 
+const realTimeFactor = (): number | null => (store.status as { real_time_factor?: number | null } | null)?.real_time_factor ?? null;
+
 export function Trends() {
   const { description } = useStore();
   if (!description) return null;
@@ -109,6 +143,7 @@ export function Trends() {
     <section class="card trends" aria-label={`The last ${SPAN_S} s`}>
       {description.platform && <TrendView title="Distance from the set-point, mm" curves={[{ name: "distance", unit: "mm" }]} values={(cycle) => [distance_mm(cycle)]} floor={1} />}
       <TrendView title="Tensions, N" curves={description.axes.map((axis) => ({ name: axis.name, unit: "N" }))} values={(cycle) => cycle.tension_N} floor={Math.max(...description.limits.tension_max_N.map((one) => one ?? 10))} />
+      {description.simulated && <TrendView title="Simulated against real time" curves={[{ name: "factor", unit: "" }]} values={() => [realTimeFactor()]} floor={1.2} />}
     </section>
   );
 }
@@ -117,6 +152,8 @@ function TrendView({ title, curves, values, floor }: { title: string; curves: Cu
   const host = useRef<HTMLDivElement>(null), trend = useRef<Trend | null>(null), count = useRef(0);
   useEffect(() => {
     trend.current = new Trend(host.current!, curves, floor);
+    store.recent.forEach((cycle) => trend.current!.add(cycle.time_s, values(cycle)));
+    trend.current.draw();
     return () => trend.current?.close();
   }, [curves.map((one) => one.name).join()]);
   useCycles((cycle) => {

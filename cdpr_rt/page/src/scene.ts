@@ -6,6 +6,10 @@ import {
   WebGLRenderer, Box3,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { TransformControls } from "three/addons/controls/TransformControls.js";
+import { Line2 } from "three/addons/lines/Line2.js";
+import { LineGeometry } from "three/addons/lines/LineGeometry.js";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import type { Cycle, Description, Platform } from "./daemon";
 
 const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Color("#d64545"), SLACK = new Color("#8a8f98");
@@ -13,6 +17,7 @@ const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Colo
 const SURE = 0.9, UNSURE = 0.3;
 const UP = new Vector3(0, 1, 0);
 const SLOW_MS = 12, SHARE = 4;
+const PIXEL = new Uint8Array(4);
 const SMALLEST_BODY_M = 0.04;
 
 /** A point of the robot's file as a vector; in a plane the third coordinate is 0. */
@@ -62,6 +67,9 @@ function label(text: string, place: Vector3, size: number): Sprite {
   return sprite;
 }
 
+/** Called with the pose of the outline while it is dragged. */
+type Dragged = (position_m: number[], rotation_rad: number[]) => void;
+
 export class RobotScene {
   #renderer: WebGLRenderer;
   #scene = new Scene();
@@ -70,6 +78,11 @@ export class RobotScene {
   #room = new Group();
   #platform = new Group();
   #ghost = new Group();
+  #handles: TransformControls;
+  #dragged: Dragged | null = null;
+  #path = new Group();
+  #part: Line2 | null = null;
+  #share = 0;
   #cables: Mesh<CylinderGeometry, MeshBasicMaterial>[] = [];
   #exits: Vector3[] = [];
   #description: Description | null = null;
@@ -88,9 +101,13 @@ export class RobotScene {
     host.append(this.#renderer.domElement);
     this.#controls = new OrbitControls(this.#camera, this.#renderer.domElement);
     this.#controls.addEventListener("change", () => this.#draw());
+    this.#handles = new TransformControls(this.#camera, this.#renderer.domElement);
+    this.#handles.addEventListener("change", () => this.#draw());
+    this.#handles.addEventListener("dragging-changed", ({ value }) => (this.#controls.enabled = !value));
+    this.#handles.addEventListener("objectChange", () => this.#drag());
     const sun = new DirectionalLight("#ffffff", 1.6);
     sun.position.set(3, 8, 5);
-    this.#scene.add(new HemisphereLight("#ffffff", "#7788aa", 1.6), sun, this.#room);
+    this.#scene.add(new HemisphereLight("#ffffff", "#7788aa", 1.6), sun, this.#room, this.#handles.getHelper());
     this.#observer = new ResizeObserver(() => this.#resize());
     this.#observer.observe(host);
     this.#resize();
@@ -98,6 +115,7 @@ export class RobotScene {
 
   close(): void {
     this.#observer.disconnect();
+    this.#handles.dispose();
     this.#controls.dispose();
     this.#renderer.dispose();
     this.#renderer.domElement.remove();
@@ -122,7 +140,7 @@ export class RobotScene {
     this.#exits = exits;
     const radius = new Box3().setFromPoints(exits).getSize(new Vector3()).length() / 700;
     this.#cables = exits.map(() => new Mesh(new CylinderGeometry(radius, radius, 1, 6), new MeshBasicMaterial({ color: SLACK })));
-    this.#room.add(this.#platform, this.#ghost, ...this.#cables);
+    this.#room.add(this.#platform, this.#ghost, this.#path, ...this.#cables);
     this.#ghost.visible = false;
     this.#place(this.#platform, at(platform.home_m), new Quaternion());
     this.#stretch(null);
@@ -169,6 +187,64 @@ export class RobotScene {
       sprite.center.set(0.5 - 0.8 * beside[number]!, 0.5); // numbers of cables that end in one point stand side by side
       this.#platform.add(sprite);
     });
+  }
+
+  /** Let the user drag the outline that `aim` shows, or turn it; null ends this. */
+  drag(how: "move" | "turn" | null, dragged: Dragged | null = null): void {
+    const platform = this.#description?.platform;
+    this.#dragged = dragged;
+    if (!how || !platform) {
+      this.#handles.detach();
+      return this.#draw();
+    }
+    const planar = platform.workspace_min_m.length === 2, about = how === "turn" && planar;
+    this.#handles.setMode(how === "turn" ? "rotate" : "translate");
+    Object.assign(this.#handles, { showX: !about, showY: !about, showZ: about || !planar, size: 0.9 });
+    this.#handles.attach(this.#ghost);
+    this.#draw();
+  }
+
+  #drag(): void {
+    const platform = this.#description?.platform;
+    if (!platform || !this.#dragged) return;
+    const { position, quaternion } = this.#ghost;
+    position.clamp(at(platform.workspace_min_m), at(platform.workspace_max_m));
+    const half = Math.acos(Math.min(Math.abs(quaternion.w), 1)), sign = Math.sign(quaternion.w) || 1;
+    const turn = new Vector3(quaternion.x, quaternion.y, quaternion.z).setLength(2 * sign * half);
+    const names = platform.controlled.filter((name) => name.length > 1);
+    const angles = names.length === 1 ? [turn.z] : turn.toArray().slice(0, names.length);
+    this.#dragged(position.toArray().slice(0, platform.workspace_min_m.length), angles.map((one) => one || 0));
+  }
+
+  /** Show a path, and the place that the robot cannot reach; or nothing. */
+  route(points_m: number[][] | null, obstacle_m: number[] | null): void {
+    this.#path.clear();
+    this.#part = null;
+    if (points_m && points_m.length > 1) {
+      const points = points_m.flatMap((one) => at(one).toArray());
+      const line = (color: string, linewidth: number): Line2 =>
+        new Line2(new LineGeometry().setPositions(points), new LineMaterial({ color, linewidth, depthTest: false, transparent: true }));
+      this.#part = line("#1f9d57", 4);
+      this.#path.add(line("#9a6fd0", 2.5), this.#part);
+    }
+    if (obstacle_m) {
+      const size = Math.max(...this.#exits.map((one) => one.length())) / 60;
+      const mark = new Mesh(new SphereGeometry(size, 16, 12), new MeshBasicMaterial({ color: HIGH, depthTest: false, transparent: true }));
+      mark.position.copy(at(obstacle_m));
+      this.#path.add(mark);
+    }
+    this.done(this.#share);
+  }
+
+  /** Show how much of the path is done, from 0 to 1. */
+  done(share: number): void {
+    this.#share = share;
+    if (this.#part) {
+      const geometry = this.#part.geometry;
+      geometry.instanceCount = Math.round(share * (geometry.attributes["instanceStart"]!.count));
+      this.#part.visible = geometry.instanceCount > 0;
+    }
+    this.#draw();
   }
 
   #addTargets(platform: Platform): void {
@@ -263,7 +339,8 @@ export class RobotScene {
     requestAnimationFrame(() => {
       const began = performance.now();
       this.#renderer.render(this.#scene, this.#camera);
-      this.#renderer.getContext().finish();
+      const gl = this.#renderer.getContext();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, PIXEL); // waits for the picture; finish() does not
       const cost_ms = performance.now() - began;
       // without a graphics processor a picture takes long: leave most of the time to the rest of the page
       setTimeout(() => {

@@ -47,7 +47,23 @@ export interface Progress {
   held_back?: string;
   target_m?: number[];
   target_rotation_rad?: number[];
-  path?: { stage?: string; name: string; time_s: number; duration_s: number };
+  position_m?: number[];
+  rotation_rad?: number[];
+  path?: PathProgress;
+}
+
+export interface PathProgress {
+  name: string;
+  plan: string;
+  stage?: string;
+  /** Why it rests, "" if it does not. */
+  waiting: string;
+  time_s: number;
+  duration_s: number;
+  feed: number;
+  line: number;
+  along_m: number;
+  length_m: number;
 }
 
 export const progressOf = (status: Status): Progress => (status.program_progress ?? {}) as Progress;
@@ -115,6 +131,7 @@ function activeOf(status: Status, description: Description | null): Situation {
       : situation("ready", "On its stand", "The cables are loose, the power is on", "tighten");
   }
   if (description?.platform && progress.tight === false) return slackOf(status);
+  if (status.program === "path" && progress.path?.waiting) return situation("on", "Paused on the path", progress.path.waiting);
   if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
     return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);
   }

@@ -1,8 +1,10 @@
 // What the page knows about the robot; components redraw on changes, and cycles go to their listeners directly.
 import { useEffect, useState } from "preact/hooks";
-import { type Cycle, type DaemonEvent, type Description, Rejected, Right, type Status, follow, request } from "./daemon";
+import { type Cycle, type DaemonEvent, type Description, type Planned, Rejected, Right, type Status, follow, request } from "./daemon";
+import { progressOf } from "./situation";
 
 const KEPT_EVENTS = 60;
+const KEPT_S = 30;
 
 class Store {
   status: Status | null = null;
@@ -11,19 +13,26 @@ class Store {
   events: DaemonEvent[] = [];
   /** Why the last request was rejected; "" if it was not. */
   rejected = "";
-  /** Where a move would end that the user is typing. */
-  preview: { position_m: number[]; rotation_rad: number[] } | null = null;
+  /** The target that the user types or drags, in mm and deg; null if there is none. */
+  target: string[] | null = null;
+  /** The path that was planned last, or is planned now. */
+  path: Planned | null = null;
+  /** Whether the last move was stopped before its end. */
+  interrupted = false;
+  /** The cycles of the last `KEPT_S`, so that a view that is opened has curves. */
+  readonly recent: Cycle[] = [];
   readonly right = new Right();
   readonly cycles = new Set<(cycle: Cycle) => void>();
   #listeners = new Set<() => void>();
+  #asked = "";
 
   constructor() {
     this.right.changed = () => this.change();
     follow({
       description: (value) => this.change({ description: value }),
-      status: (value) => this.change({ status: value }),
+      status: (value) => this.#look(value),
       event: (value) => this.change({ events: [value, ...this.events.filter((one) => one.number !== value.number)].slice(0, KEPT_EVENTS) }),
-      cycle: (value) => this.cycles.forEach((listener) => listener(value)),
+      cycle: (value) => this.#keep(value),
       connected: (value) => {
         if (value === this.connected && value) return;
         this.change({ connected: value }); // a rejected key is shown although the page was not connected before
@@ -32,9 +41,35 @@ class Store {
     });
   }
 
-  change(values: Partial<Pick<Store, "status" | "description" | "events" | "connected" | "rejected" | "preview">> = {}): void {
+  change(values: Partial<Pick<Store, "status" | "description" | "events" | "connected" | "rejected" | "target" | "path">> = {}): void {
     Object.assign(this, values);
     this.#listeners.forEach((listener) => listener());
+  }
+
+  #look(status: Status): void {
+    const progress = progressOf(status);
+    if (status.program === "pose" && progress.target_m) this.interrupted = (progress.done ?? 1) < 1;
+    else if (status.program !== "hold" || status.state !== "active") this.interrupted = false;
+    const plan = progress.path?.plan;
+    if (plan && plan !== this.#asked && plan !== this.path?.plan) {
+      this.#asked = plan;
+      void this.#planOf(plan);
+    }
+    this.change({ status });
+  }
+
+  /** Get the route of a path that another client has planned. */
+  async #planOf(plan: string): Promise<void> {
+    const path = await request<Planned>("GET", "/path").catch(() => null);
+    if (path?.plan === plan) this.change({ path });
+  }
+
+  #keep(cycle: Cycle): void {
+    const { recent } = this;
+    if (recent.length && cycle.time_s < recent[recent.length - 1]!.time_s) recent.length = 0; // the loop has started anew
+    recent.push(cycle);
+    while (recent[0]!.time_s < cycle.time_s - KEPT_S) recent.shift();
+    this.cycles.forEach((listener) => listener(cycle));
   }
 
   /** Get what happened before this page was opened, or while it had no connection. */
