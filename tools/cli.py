@@ -42,6 +42,7 @@ MODULES = {
     "run": {
         "run": "Start a robot's control loop as a daemon. The motors get no power until you "
         "enable them.",
+        "demo": "Start a simulated robot and open its page in a browser.",
     },
     "service_unit": {
         "service-unit": "Print a systemd unit that runs the robot's daemon.",
@@ -123,7 +124,7 @@ PANELS = {
     "Describe": ("robot", "profiles"),
     "Commission": ("commission", "drive", "cogging", "tension", "io", "rail"),
     "Calibrate": ("calibrate", "camera", "markers", "poses"),
-    "Simulate": ("sim",),
+    "Simulate": ("demo", "sim"),
     "Machine": ("doctor",),
 }
 """Which commands the help shows, and under which headings; it hides the others."""

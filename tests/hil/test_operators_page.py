@@ -9,8 +9,10 @@ import signal
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image as mpl_image
+import numpy as np
 import pytest
 from daemon_rig import PATIENCE_S, RealDaemon, until
 
@@ -144,6 +146,81 @@ def test_the_space_bar_stops_a_motion_that_another_page_leads(
         assert other.get_by_role("button", name="Go").is_disabled()
 
 
+def choose(page: playwright_api.Page, text: str) -> None:
+    """Choose a file of G-code, and wait until the daemon has planned it."""
+    file = {"name": "part.nc", "mimeType": "text/plain", "buffer": text.encode()}
+    page.locator("input[type=file]").set_input_files(file)
+    page.locator(".verdict").wait_for()
+
+
+def test_a_path_is_checked_followed_paused_and_continued_by_clicks(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        choose(page, "G21 G90 G0 X0 Y0\nG1 X0 Y5000 F3000\nM2\n")
+        page.locator(".verdict.bad").filter(has_text="part.nc:2: at").wait_for()
+        choose(page, "G21 G90 G0 X0 Y0\nG1 X100 Y0 F3000\nG1 X100 Y100\nM2\n")
+        page.get_by_label("zero x, mm").fill("-200")
+        page.get_by_label("zero y, mm").fill("1500")
+        assert page.get_by_role("button", name="Follow the path").is_disabled()  # for old options
+        press(page, "Plan again")
+        page.get_by_text("The robot can follow it: 0.20 m").wait_for()
+        press(page, "Follow the path")
+        page.get_by_text("Following it").wait_for()
+        page.get_by_label("Feed").fill("20")
+        until(lambda: _path(daemon)["feed"] == 0.2)
+        press(page, "Pause the path")
+        see(page, "Paused on the path")
+        rests_m = _path(daemon)["along_m"]
+        assert 0.0 < rests_m < 0.2
+        page.keyboard.press("Space")
+        until(lambda: daemon.status()["program"] == "hold")
+        page.get_by_label("Distance back").select_option("10")
+        press(page, "Back")
+        page.get_by_text("stepped back").first.wait_for()
+        assert _path(daemon)["along_m"] < rests_m
+        press(page, "Resume the path")
+        page.get_by_label("Feed").fill("100")
+        until(lambda: position_m(daemon) == pytest.approx([-0.1, 1.6], abs=2e-3))
+        page.get_by_text("Following it").wait_for(state="detached")
+
+
+def _path(daemon: RealDaemon) -> dict[str, Any]:
+    progress: dict[str, Any] = daemon.status()["program_progress"]["path"]
+    return progress
+
+
+def test_a_stopped_move_continues_to_its_target(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        send_to(page, "300", "2200")
+        see(page, "Moving")
+        press(page, "Pause")
+        press(page, "Continue the move")
+        until(lambda: position_m(daemon) == pytest.approx([0.3, 2.2], abs=2e-3))
+
+
+def test_every_view_is_reachable_with_the_keyboard_and_has_the_stop(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon), width=390) as page:
+        links = page.get_by_role("navigation", name="Views").get_by_role("link")
+        links.first.wait_for()
+        for number in range(links.count()):
+            links.nth(number).focus()
+            page.keyboard.press("Enter")
+            page.locator(
+                f"nav a[aria-current=page] >> text={links.nth(number).inner_text()}"
+            ).wait_for()
+            assert page.get_by_role("button", name="Stop").is_visible()
+            see(page, "Holding the platform")
+        page.go_back()
+        assert links.nth(links.count() - 2).get_attribute("aria-current") == "page"
+
+
 def test_a_motion_holds_when_its_page_is_closed(
     daemon: RealDaemon, browser: playwright_api.Browser
 ) -> None:
@@ -226,6 +303,23 @@ def test_the_robot_is_drawn_and_the_page_works_without_drawing(
         see(page, "Holding the platform")
         canvas = page.locator(".scene canvas")
         until(lambda: len(set(_colours(canvas.screenshot()))) > 3)
+        press(page, "Drag a target")
+        before_mm = [page.get_by_label(f"{axis}, mm").input_value() for axis in "xy"]
+        x, y = _handle(canvas.screenshot())
+        canvas.hover(position={"x": x, "y": y})
+        page.mouse.down()
+        canvas.hover(position={"x": x + 40, "y": y})
+        page.mouse.up()
+        until(lambda: page.get_by_label("x, mm").input_value() != before_mm[0])
+        assert page.get_by_role("button", name="Go there").is_enabled()
+
+
+def _handle(png: bytes) -> tuple[float, float]:
+    """Return the middle of the blue square with which the outline is dragged in a plane."""
+    red, green, blue = np.moveaxis(mpl_image.imread(io.BytesIO(png))[..., :3], 2, 0)
+    rows, columns = np.nonzero((blue > 0.9) & (red < 0.6) & (green < 0.6))
+    assert rows.size
+    return float(columns.mean()), float(rows.mean())
 
 
 def _colours(png: bytes) -> list[tuple[float, ...]]:

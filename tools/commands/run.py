@@ -221,6 +221,22 @@ def run(
         _launch(profile, settings, out, manager, simulator, open_it=open_it)
 
 
+@app.command()
+def demo(
+    robot: Annotated[
+        str, typer.Option("--robot", help="Robot profile, a name or a file.")
+    ] = "planar-3",
+    no_open: Annotated[
+        bool, typer.Option("--no-open", help="Open no browser; print the page's address.")
+    ] = False,
+) -> None:
+    """Start a simulated robot and open its page in a browser. It runs until Ctrl-C.
+
+    It is `cdpr run ROBOT --bus simbus: --open`. Nothing gets power until you press *Enable*.
+    """
+    run(robot, bus=["simbus:"], open_it=not no_open)
+
+
 def _simulator(
     robot: Robot,
     settings: RunSettings,
