@@ -213,7 +213,7 @@ async def _is_here() -> bool:
 
 
 FASTEST_HZ: Final = 50.0
-_MOST_LIVE = 16
+_MOST_LIVE = 64
 _STATUS_S = 1.0
 _MOST_CYCLES = 1000
 

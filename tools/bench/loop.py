@@ -119,13 +119,13 @@ def daemon(robot: Robot, seconds: float, folder: Path, controller: str | None = 
         run(robot.path, bus=bus, record=record, controller=controller) as handle,
         _watched(default_socket(robot.profile)),
     ):
-        to_and_fro = _motion(robot, handle)
+        to_and_fro = motion(robot, handle)
         next(to_and_fro)
         pid = int(handle.status["loop"]["pid"])
-        begin_ns, begin_s = time.monotonic_ns(), _processor_time_s(pid)
+        begin_ns, begin_s = time.monotonic_ns(), processor_time_s(pid)
         while time.monotonic_ns() < begin_ns + 1e9 * seconds:
             next(to_and_fro)
-        processor_s, end_ns = _processor_time_s(pid) - begin_s, time.monotonic_ns()
+        processor_s, end_ns = processor_time_s(pid) - begin_s, time.monotonic_ns()
         log = handle.log()
     rows = log[(log["stamp_ns"] >= begin_ns) & (log["stamp_ns"] <= end_ns)]
     return {
@@ -138,7 +138,7 @@ def daemon(robot: Robot, seconds: float, folder: Path, controller: str | None = 
     }
 
 
-def _motion(robot: Robot, handle: RobotHandle) -> Iterator[None]:
+def motion(robot: Robot, handle: RobotHandle) -> Iterator[None]:
     """Enable the drives and move back and forth; yield after each leg.
 
     Bare axes turn; a platform goes through the middle of its box.
@@ -159,7 +159,7 @@ def _motion(robot: Robot, handle: RobotHandle) -> Iterator[None]:
             yield
 
 
-def _processor_time_s(pid: int) -> float:
+def processor_time_s(pid: int) -> float:
     """Return the processor time of all threads of a process, including threads that have ended."""
     # id of the process' clock as from clock_getcpuclockid, which Python does not offer
     return time.clock_gettime_ns((~pid << 3) | _SCHEDULED) * 1e-9

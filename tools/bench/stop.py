@@ -21,6 +21,7 @@ from cdpr_rt.loop.stop_socket import STOP_SUFFIX, send_stop
 from cdpr_tools.bench import flood
 from cdpr_tools.bench.harness import Figures, Row, Target, percentiles
 from cdpr_tools.bench.loop import with_tolerant_limits
+from cdpr_tools.bench.page import press_stops
 from cdpr_tools.client.client import await_start, open_daemon
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
@@ -36,12 +37,15 @@ Ask = Callable[[str], object]
 """Requests a stop and returns once the loop has answered."""
 
 
-def measure(stops: int, out: Output) -> Figures:
+def measure(stops: int, out: Output, *, from_page: bool = False) -> Figures:
     """Stop a daemon with its own simulated robot, which has no power, with and without a flood.
 
     Stops go over the loop's socket and over HTTP in turn, each on a new connection. A figure is the
-    time until the loop's answer arrives. Raises WorkFailedError.
+    time until the loop's answer arrives. `from_page` presses the page's stop button instead. Raises
+    WorkFailedError.
     """
+    if from_page:
+        return press_stops(stops, out)
     rows: dict[str, Row] = {}
     sent: Counter[str] = Counter()
     cases = {"nobody else asks": 0, "flooded": _CLIENTS}

@@ -147,6 +147,19 @@ def loop(
 
 
 @app.command()
+def page(
+    seconds: Annotated[float, _option("Duration of each case.", 3, 3600)] = 60.0,
+    hours: Annotated[float, _option("Hours of messages that a page gets.", 0.1, 1000)] = 8.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the robot's page in Chromium: start, rate, cost, 50 pages at once, memory.
+
+    The robot has 8 axes at 1 kHz. Nobody, one page, and 50 pages watch it in turns.
+    """
+    _run("page", as_json, seconds=seconds, hours=hours)
+
+
+@app.command()
 def soak(
     hours: Annotated[float, _option("Hours of bus time.", 1e-4, 1e4)] = 1.0,
     wall_minutes: Annotated[
@@ -171,13 +184,19 @@ def soak(
 @app.command()
 def stop(
     stops: Annotated[int, _option("Stops of each kind.", 1, 100_000)] = 500,
+    from_page: Annotated[
+        bool,
+        typer.Option(
+            "--page", help="Press the page's stop in Chromium while motors turn, and watch the bus."
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Measure how soon the loop accepts a stop while four clients flood every interface.
 
     On a separate simulated robot, without power; the flood stays on this machine.
     """
-    _run("stop", as_json, stops=stops)
+    _run("stop", as_json, stops=stops, from_page=from_page)
 
 
 @app.command()
