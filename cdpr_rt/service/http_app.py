@@ -680,6 +680,14 @@ def _add_path(app: FastAPI, service: Service) -> None:
         """
         return models.Planned.model_validate(service.planner.job)
 
+    @app.get("/workspace", responses=_REFUSALS)
+    async def workspace() -> models.Border:
+        """The border of the positions where the cables can hold the platform at rest.
+
+        The first answer takes some seconds.
+        """
+        return models.Border.model_validate(await service.border.get())
+
 
 def _done(reply: Reply) -> models.Done:
     if not reply.ok:

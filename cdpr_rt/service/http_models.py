@@ -454,6 +454,14 @@ class RobotSaved(_Answer):
     file: str
 
 
+class Border(_Answer):
+    """The border of a workspace: in a plane a polygon, in space triangles."""
+
+    points_m: list[list[float]]
+    triangles: list[list[int]]
+    """Numbers of the points of each triangle, empty in a plane."""
+
+
 class ControlTaken(_Answer):
     """The right to move, for the client that shows the token."""
 

@@ -91,6 +91,33 @@ class PathPlanRunner:
             self.job.setdefault("error", None)
 
 
+class WorkspaceBorder:
+    """Computes the border of the robot's workspace once, on the first request."""
+
+    def __init__(self) -> None:
+        self.work: Callable[[], Awaitable[tuple[int, str]]] | None = None
+        """Function that computes it in a separate process; None if no robot is known."""
+        self._found: asyncio.Task[dict[str, Any]] | None = None
+
+    async def get(self) -> dict[str, Any]:
+        """Return it, as `models.Border`; raises PlannerBusyError if there is none."""
+        if self.work is None:
+            raise PlannerBusyError("this daemon computes no workspace")
+        if self._found is None:
+            self._found = asyncio.create_task(self._compute(self.work()))
+        found = await asyncio.shield(self._found)
+        if error := found.get("error"):
+            raise PlannerBusyError(str(error))
+        return found
+
+    @staticmethod
+    async def _compute(work: Awaitable[tuple[int, str]]) -> dict[str, Any]:
+        try:
+            return _read(*await work)
+        except (OSError, TimeoutError) as error:
+            return {"error": f"the workspace cannot be computed: {error}"}
+
+
 def _read(status: int, text: str) -> dict[str, Any]:
     """Return the result of the process."""
     try:
@@ -168,6 +195,7 @@ class Service:
             self.lease, lambda text: self.events.add("procedure", text), self._pass_buses
         )
         """Runs commissioning and calibration in a separate process."""
+        self.border = WorkspaceBorder()
         self.stream: SetpointStream | None = None
         """The running set-point stream, None if none is received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}

@@ -47,6 +47,7 @@ from cdpr_tools.daemon.procedures import planned
 from cdpr_tools.daemon.robot_describer import WITHIN, RobotDescriber
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, BadInputError, CommandError
+from cdpr_tools.processes import module_command
 from cdpr_tools.streams import guard_streams, outlive_output
 
 # Log lines that clients can trigger: a few of each kind a minute; the others are counted.
@@ -161,6 +162,7 @@ def main() -> int:
     describer = RobotDescriber(settings.robot)
     service.describe = describer.answer
     service.background.append(describer.watch)
+    service.border.work = partial(border_in_process, settings.robot)
     if settings.simulated:
         service.inject = partial(inject_fault, settings)
     try:
@@ -301,9 +303,19 @@ async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tu
         for key in _PATH_OPTIONS
         if request.get(key) is not None
     ]
-    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", "show", str(file)]
+    given = ["path", "show", str(file), "--robot", robot, "--keep", "--json", *options]
+    return await _run_beside(*module_command("cdpr_tools.cli", *given))
+
+
+async def border_in_process(robot: str) -> tuple[int, str]:
+    """Compute the border of the workspace; return exit status and the JSON line."""
+    return await _run_beside(*module_command("cdpr_tools.robots.workspace_border", robot))
+
+
+async def _run_beside(*command: str) -> tuple[int, str]:
+    """Run a command with little priority and memory; return exit status and its last line."""
     process = await asyncio.create_subprocess_exec(
-        "sh", "-c", WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,
+        "sh", "-c", WITHIN, "sh", *command,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip

@@ -8,6 +8,7 @@ export type Curves = components["schemas"]["Curves"];
 export type ProcedureRequest = NonNullable<paths["/procedure"]["post"]["requestBody"]>["content"]["application/json"];
 /** A procedure's values, without the name of the client. */
 export type Wanted = ProcedureRequest extends infer One ? (One extends unknown ? Omit<One, "client"> : never) : never;
+export type Border = components["schemas"]["Border"];
 export type Planned = components["schemas"]["Planned"];
 export type DaemonEvent = components["schemas"]["Event"];
 export type Quantity = components["schemas"]["Quantity"];

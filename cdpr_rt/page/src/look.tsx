@@ -1,7 +1,7 @@
 // What is only looked at: the robot, tensions, curves, events, axes.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
-import { type Cycle, type Description, hasKey } from "./daemon";
+import { type Border, type Cycle, type Description, hasKey, request } from "./daemon";
 import { anglesOf, go, positionsOf, presentPose, targetOf, useHindrance } from "./move";
 import { RobotScene, tensionColour } from "./scene";
 import { progressOf } from "./situation";
@@ -13,6 +13,14 @@ const RAD = Math.PI / 180;
 export function RobotView() {
   const { description, status, target, path } = useStore();
   const [turns, setTurns] = useState(false);
+  const [border, setBorder] = useState<Border | "computing" | null>(null);
+  const toggle = async (): Promise<void> => {
+    if (border) return setBorder(null);
+    setBorder("computing");
+    await store.attempt(async () => setBorder(await request<Border>("GET", "/workspace")));
+    setBorder((now) => (now === "computing" ? null : now)); // it was rejected
+  };
+  useEffect(() => scene.current?.workspace(border === "computing" ? null : border), [border, description]);
   const host = useRef<HTMLDivElement>(null);
   const scene = useRef<RobotScene | null>(null);
   useEffect(() => {
@@ -51,9 +59,10 @@ export function RobotView() {
     <section class="card robot" aria-label="The robot in three dimensions">
       <div class="scene" ref={host} />
       <Place />
-      {platform && hasKey() && free && (
+      {platform && hasKey() && (
         <div class="overlay">
-          {!target && <button onClick={() => store.change({ target: presentPose(platform) })} title="Drag the arrows of the outline to where the platform is to go">Drag a target</button>}
+          <button aria-pressed={border !== null} disabled={border === "computing"} onClick={() => void toggle()} title="Show where the cables can hold the platform at rest">{border === "computing" ? "Computing …" : "Workspace"}</button>
+          {!target && free && <button onClick={() => store.change({ target: presentPose(platform) })} title="Drag the arrows of the outline to where the platform is to go">Drag a target</button>}
           {target && anglesOf(platform).length > 0 && <button aria-pressed={turns} onClick={() => setTurns(!turns)}>Turn</button>}
           {target && <button class="go" disabled={!wanted} onClick={() => go(platform)}>Go there</button>}
           {target && <button onClick={() => store.change({ target: null })}>Discard the target</button>}

@@ -1,16 +1,16 @@
 // The robot in three dimensions: frame, cables coloured by tension, platform, box of targets, target.
 import {
-  BoxGeometry, BufferGeometry, CanvasTexture, Color, CylinderGeometry, EdgesGeometry, GridHelper, Group,
-  HemisphereLight, DirectionalLight, LineBasicMaterial, LineDashedMaterial, LineSegments, Mesh,
+  BoxGeometry, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DoubleSide, EdgesGeometry, GridHelper, Group,
+  HemisphereLight, DirectionalLight, LineBasicMaterial, LineDashedMaterial, LineLoop, LineSegments, Mesh,
   MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene, SphereGeometry, Sprite, SpriteMaterial, SRGBColorSpace, Vector3,
-  WebGLRenderer, Box3,
+  WebGLRenderer, WireframeGeometry, Box3,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { Line2 } from "three/addons/lines/Line2.js";
 import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
-import type { Cycle, Description, Platform } from "./daemon";
+import type { Border, Cycle, Description, Platform } from "./daemon";
 
 const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Color("#d64545"), SLACK = new Color("#8a8f98");
 /** Opacity of the platform, if its pose is known and if not. */
@@ -81,6 +81,7 @@ export class RobotScene {
   #handles: TransformControls;
   #dragged: Dragged | null = null;
   #path = new Group();
+  #border = new Group();
   #part: Line2 | null = null;
   #share = 0;
   #cables: Mesh<CylinderGeometry, MeshBasicMaterial>[] = [];
@@ -138,9 +139,9 @@ export class RobotScene {
     this.#addTargets(platform);
     this.#addPlatform(platform);
     this.#exits = exits;
-    const radius = new Box3().setFromPoints(exits).getSize(new Vector3()).length() / 700;
+    const radius = new Box3().setFromPoints(exits).getSize(new Vector3()).length() / 450;
     this.#cables = exits.map(() => new Mesh(new CylinderGeometry(radius, radius, 1, 6), new MeshBasicMaterial({ color: SLACK })));
-    this.#room.add(this.#platform, this.#ghost, this.#path, ...this.#cables);
+    this.#room.add(this.#platform, this.#ghost, this.#path, this.#border, ...this.#cables);
     this.#ghost.visible = false;
     this.#place(this.#platform, at(platform.home_m), new Quaternion());
     this.#stretch(null);
@@ -187,6 +188,21 @@ export class RobotScene {
       sprite.center.set(0.5 - 0.8 * beside[number]!, 0.5); // numbers of cables that end in one point stand side by side
       this.#platform.add(sprite);
     });
+  }
+
+  /** Show where the cables can hold the platform, or nothing. */
+  workspace(border: Border | null): void {
+    this.#border.clear();
+    if (border) {
+      const geometry = new BufferGeometry().setFromPoints(border.points_m.map(at));
+      if (border.triangles.length) geometry.setIndex(border.triangles.flat());
+      const colour = { color: "#1f8a8a", transparent: true, depthWrite: false };
+      this.#border.add(border.triangles.length
+        ? new Mesh(geometry, new MeshBasicMaterial({ ...colour, opacity: 0.12, side: DoubleSide }))
+        : new LineLoop(geometry, new LineBasicMaterial(colour)));
+      if (border.triangles.length) this.#border.add(new LineSegments(new WireframeGeometry(geometry), new LineBasicMaterial({ ...colour, opacity: 0.18 })));
+    }
+    this.#draw();
   }
 
   /** Let the user drag the outline that `aim` shows, or turn it; null ends this. */
