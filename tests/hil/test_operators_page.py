@@ -146,26 +146,26 @@ def test_the_space_bar_stops_a_motion_that_another_page_leads(
         assert other.get_by_role("button", name="Go").is_disabled()
 
 
-def choose(page: playwright_api.Page, text: str) -> None:
-    """Choose a file of G-code, and wait until the daemon has planned it."""
-    file = {"name": "part.nc", "mimeType": "text/plain", "buffer": text.encode()}
-    page.locator("input[type=file]").set_input_files(file)
-    page.locator(".verdict").wait_for()
+def see_plan(page: playwright_api.Page, text: str) -> None:
+    """Wait for a verdict; the planner has little priority, so it takes long on a busy machine."""
+    page.locator(".verdict").filter(has_text=text).wait_for(timeout=6e3 * PATIENCE_S)
 
 
 def test_a_path_is_checked_followed_paused_and_continued_by_clicks(
     daemon: RealDaemon, browser: playwright_api.Browser
 ) -> None:
+    text = "G21 G90 G0 X0 Y0\nG1 X900 Y0 F3000\nG1 X900 Y1100\nM2\n"
+    file = {"name": "part.nc", "mimeType": "text/plain", "buffer": text.encode()}
     with opened(browser, address(daemon)) as page:
         see(page, "Holding the platform")
-        choose(page, "G21 G90 G0 X0 Y0\nG1 X0 Y5000 F3000\nM2\n")
-        page.locator(".verdict.bad").filter(has_text="part.nc:2").wait_for()
-        choose(page, "G21 G90 G0 X0 Y0\nG1 X100 Y0 F3000\nG1 X100 Y100\nM2\n")
+        page.locator("input[type=file]").set_input_files(file)
+        see_plan(page, "part.nc:")
+        assert page.get_by_role("button", name="Follow the path").count() == 0
         page.get_by_label("zero x, mm").fill("-200")
         page.get_by_label("zero y, mm").fill("1500")
-        assert page.get_by_role("button", name="Follow the path").is_disabled()  # for old options
+        page.get_by_label("scale").fill("0.1")
         press(page, "Plan again")
-        page.get_by_text("The robot can follow it: 0.20 m").wait_for()
+        see_plan(page, "The robot can follow it: 0.20 m")
         press(page, "Follow the path")
         page.get_by_text("Following it").wait_for()
         page.get_by_label("Feed").fill("20")
@@ -182,7 +182,7 @@ def test_a_path_is_checked_followed_paused_and_continued_by_clicks(
         assert _path(daemon)["along_m"] < rests_m
         press(page, "Resume the path")
         page.get_by_label("Feed").fill("100")
-        until(lambda: position_m(daemon) == pytest.approx([-0.1, 1.6], abs=2e-3))
+        until(lambda: position_m(daemon) == pytest.approx([-0.11, 1.61], abs=2e-3))
         page.get_by_text("Following it").wait_for(state="detached")
 
 
@@ -201,6 +201,24 @@ def test_a_stopped_move_continues_to_its_target(
         press(page, "Pause")
         press(page, "Continue the move")
         until(lambda: position_m(daemon) == pytest.approx([0.3, 2.2], abs=2e-3))
+
+
+def test_every_view_is_reachable_with_the_keyboard_and_has_the_stop(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon), width=390) as page:
+        links = page.get_by_role("navigation", name="Views").get_by_role("link")
+        links.first.wait_for()
+        for number in range(links.count()):
+            links.nth(number).focus()
+            page.keyboard.press("Enter")
+            page.locator(
+                f"nav a[aria-current=page] >> text={links.nth(number).inner_text()}"
+            ).wait_for()
+            assert page.get_by_role("button", name="Stop").is_visible()
+            see(page, "Holding the platform")
+        page.go_back()
+        assert links.nth(links.count() - 2).get_attribute("aria-current") == "page"
 
 
 def test_a_motion_holds_when_its_page_is_closed(
