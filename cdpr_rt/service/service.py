@@ -100,7 +100,7 @@ class WorkspaceBorder:
         self._found: asyncio.Task[dict[str, Any]] | None = None
 
     async def get(self) -> dict[str, Any]:
-        """Return it, as `models.Border`; raises PlannerBusyError if there is none."""
+        """Return it, as `models.Border`; raises PlannerBusyError if it cannot be computed."""
         if self.work is None:
             raise PlannerBusyError("this daemon computes no workspace")
         if self._found is None:

@@ -42,6 +42,7 @@ _FIELDS: Final = "time_s,tension_N,tension_measured,pose,pose_setpoint"
 _STOP_ROBOT, _ROBOT = "bench-2", "bench-8"
 _OTHERS, _MANY, _SLOW = 19, 49, 5
 _SPEED_rad_s, _TURNS_S, _BRAKES_S = 6.0, 0.15, 0.2
+_PATIENCE_S, _LOOK_S = 60.0, 0.02
 _OPENINGS, _ROUNDS, _A_TIME = 10, 3, 300
 _BATCH = 30 * 900
 _NO_GRAPHICS: Final = ("--no-sandbox", "--disable-3d-apis")
@@ -113,13 +114,17 @@ def _opened(browser: Browser, url: str) -> Page:
     page = context.new_page()
     page.add_init_script(_IN_PAGE)
     page.goto(url)
-    page.wait_for_function("globalThis.__painted && __cycles > 0")
+    end_s = time.monotonic() + _PATIENCE_S
+    while not page.evaluate("globalThis.__painted > 0 && __cycles > 0"):
+        if time.monotonic() > end_s:
+            raise WorkFailedError("the page shows no robot")
+        time.sleep(_LOOK_S)
     return page
 
 
 @contextmanager
 def _robot(name: str) -> Iterator[tuple[Robot, Any, Daemon, str]]:
-    """Run a daemon on a simulator of its own; yield also the page's address."""
+    """Run a daemon on a separate simulator; yield also the page's address."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-bench-")))
         robot = with_tolerant_limits(load_robot(name), folder)
@@ -315,7 +320,7 @@ def _growth_MB(page: Page, hours: float, out: Output) -> float:
     return (used() - before) / 1e6
 
 
-# The other pages, in a process of their own.
+# The other pages, in a separate process.
 
 
 async def _read_like_pages(url: str, pages: int, slow: int) -> None:

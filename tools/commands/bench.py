@@ -152,7 +152,7 @@ def page(
     hours: Annotated[float, _option("Hours of messages that a page gets.", 0.1, 1000)] = 8.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure the robot's page in Chromium: start, rate, cost, 50 pages at once, memory.
+    """Measure the robot's page in Chromium: start, rate, cost, 50 open pages, memory.
 
     The robot has 8 axes at 1 kHz. Nobody, one page, and 50 pages watch it in turns.
     """

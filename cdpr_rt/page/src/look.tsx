@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
 import { type Border, type Cycle, type Description, hasKey, request } from "./daemon";
-import { anglesOf, go, positionsOf, presentPose, targetOf, useHindrance } from "./move";
+import { anglesOf, go, positionsOf, presentPose, rounded, targetOf, useHindrance } from "./move";
 import { RobotScene, tensionColour } from "./scene";
 import { progressOf } from "./situation";
 import { store, useCycles, useStore } from "./store";
@@ -47,7 +47,7 @@ export function RobotView() {
   const free = useHindrance() === "";
   useEffect(() => {
     if (platform && target) scene.current?.drag(turns ? "turn" : "move", (position_m, rotation_rad) =>
-      store.change({ target: [...position_m.map((one) => (1e3 * one).toFixed(0)), ...rotation_rad.map((one) => (one / RAD).toFixed(1))] }));
+      store.change({ target: [...position_m.map((one) => rounded(1e3 * one, 0)), ...rotation_rad.map((one) => rounded(one / RAD, 1))] }));
     else scene.current?.drag(null);
   }, [target === null, turns, description]);
   const under = progress?.path;
@@ -72,7 +72,7 @@ export function RobotView() {
   );
 }
 
-const mm = (value: number | null | undefined): string => (value == null ? "–" : (1e3 * value).toFixed(1));
+const mm = (value: number | null | undefined): string => (value == null ? "–" : rounded(1e3 * value, 1));
 
 /** The platform's position as numbers. */
 function Place() {

@@ -66,11 +66,14 @@ export function targetOf(platform: Platform, typed: string[]): { position_m: num
   return { position_m: numbers.slice(0, count).map((one) => one / 1e3), rotation_rad: numbers.slice(count).map((one) => one * RAD) };
 }
 
+/** Return a number as text, without the sign of a zero. */
+export const rounded = (value: number, digits: number): string => value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+
 /** The present pose in the fields' units. */
 export function presentPose(platform: Platform): string[] | null {
   const progress = store.status && progressOf(store.status);
   const angles = anglesOf(platform).map((_, number) => progress?.rotation_rad?.[number] ?? 0);
-  return progress?.position_m ? [...progress.position_m.map((one) => (1e3 * one).toFixed(0)), ...angles.map((one) => (one / RAD).toFixed(1))] : null;
+  return progress?.position_m ? [...progress.position_m.map((one) => rounded(1e3 * one, 0)), ...angles.map((one) => rounded(one / RAD, 1))] : null;
 }
 
 export const go = (platform: Platform, share = 100): void => {

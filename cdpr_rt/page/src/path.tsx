@@ -143,7 +143,7 @@ function Following({ path, running }: { path: PathProgress; running: boolean }) 
   const left_s = (path.duration_s - path.time_s) / Math.max(path.feed, 0.01);
   const wish = (wanted: Record<string, unknown>) => () =>
     void store.attempt(() => (running ? store.right.set(wanted) : store.right.program("path", wanted)));
-  const where = path.stage === "to the path" ? "Moving to its beginning" : !running ? "Left" : path.waiting || "Following it";
+  const where = !running ? "Left" : path.waiting || (path.stage === "path" ? "Following it" : "Moving to it");
   return (
     <div class="following">
       <p><strong>{path.name}</strong> <span class="quiet">{where}</span></p>
