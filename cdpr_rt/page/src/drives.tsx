@@ -36,7 +36,7 @@ export function Drives() {
   }, []);
   const drive = found?.drives[axis];
   return (
-    <div class="columns">
+    <div class="columns drives-first">
       <div class="column wide">
         <DriveTable drives={found?.drives ?? []} status={status} axis={axis} choose={setAxis} />
         {drive && <StatusBits drive={drive} />}

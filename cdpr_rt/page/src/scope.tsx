@@ -95,7 +95,7 @@ function ScopeOf({ known, quantities, description }: { known: ScopeCurve[]; quan
         {file === null && <TriggerChoice trigger={trigger} change={setTrigger} curves={curves} rearm={live.rearm} />}
       </section>
       {still
-        ? <Cursors samples={samples} window={shown} curves={curves} cursors={cursors} change={setCursors} />
+        ? <Cursors samples={samples} window={shown} curves={curves} cursors={cursors} change={setCursors} zoomTo={zoomTo} />
         : <section class="card"><h2>Cursors</h2><p class="quiet">Pause to place cursors: they show values, differences and the figures of a step response.</p></section>}
       <Parameters />
     </>
@@ -273,7 +273,10 @@ function TriggerChoice({ trigger, change, curves, rearm }: { trigger: Trigger; c
 
 const figure = (value: number | null | undefined): string => (value == null ? "–" : +value.toPrecision(6) + "");
 
-function Cursors({ samples, window, curves, cursors, change }: { samples: Samples; window: [number, number]; curves: ScopeCurve[]; cursors: (number | null)[]; change(cursors: (number | null)[]): void }) {
+function Cursors({ samples, window, curves, cursors, change, zoomTo }: {
+  samples: Samples; window: [number, number]; curves: ScopeCurve[]; cursors: (number | null)[];
+  change(cursors: (number | null)[]): void; zoomTo(from_s: number, until_s: number): void;
+}) {
   const [a, b] = cursors;
   const at = (number: number, at_s: number | null | undefined): number | null => (at_s == null ? null : (samples.values[number]?.[placeOf(samples.time_s, at_s)] ?? null));
   const text = (curve: ScopeCurve, value: number | null): string => (value !== null && curve.labels?.[value]) || figure(value);
@@ -289,6 +292,7 @@ function Cursors({ samples, window, curves, cursors, change }: { samples: Sample
     <section class="card" aria-labelledby="cursors">
       <h2 id="cursors">Cursors</h2>
       {slider("A", 0)}{slider("B", 1)}
+      {ordered && ordered[1] > ordered[0] && <div class="row"><button onClick={() => zoomTo(...ordered)}>Zoom to the cursors</button></div>}
       {a == null && <p class="quiet note">Press on the curves, or move a slider, to place a cursor.</p>}
       {(a != null || b != null) && (
         <div class="scroll" tabIndex={0} role="region" aria-label="Values at the cursors">

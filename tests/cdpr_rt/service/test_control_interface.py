@@ -375,3 +375,34 @@ def test_a_command_too_long_for_the_loop_is_rejected(rig: Rig) -> None:
         answer = client.post("/set", json={"wanted": wanted}, headers=take(client))
     assert answer.status_code == 413
     assert rig.loop.commands == []
+
+
+def test_the_last_of_several_changed_values_is_an_event_with_its_client(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client)
+        for feed in (0.3, 0.4, 0.5):
+            body = {"wanted": {"feed": feed}, "client": "maria"}
+            assert client.post("/set", json=body, headers=headers).status_code == 200
+
+        def found() -> list[str]:
+            events = client.get("/events").json()["events"]
+            return [one["text"] for one in events if one["kind"] == "set"]
+
+        wait_for(lambda: bool(found()))
+        assert found() == ["set feed 0.5 of idle by maria"]
+
+
+def test_objects_are_read_with_access_and_written_with_the_right_to_move(rig: Rig) -> None:
+    body = {"axis": 1, "index": 0x603F, "client": "maria"}
+    with rig.client() as client:
+        assert client.post("/object", json=body).status_code == 200
+        refused = client.post("/object", json={**body, "value": 1})
+        assert refused.status_code == 409
+        assert "right to move" in refused.json()["error"]
+        for wrong in ({"index": 0x10000}, {"sub": 256}, {"axis": -1}, {"value": 1.5}):
+            assert client.post("/object", json={**body, **wrong}).status_code == 422
+        client.post("/object", json={**body, "value": 1}, headers=take(client))
+        events = [one["text"] for one in client.get("/events").json()["events"]]
+    assert events.count("object of axis 1, 603Fh:0 to 1 by maria") == 1
+    read, written = rig.loop.commands
+    assert (read["value"], written["value"]) == (None, 1)

@@ -56,6 +56,18 @@ def closed_for(connection: ClientConnection) -> tuple[int, str]:
 # -- live values
 
 
+def test_live_sends_every_cycle_on_request(rig: Rig) -> None:
+    path = "/live?rate_Hz=20&all_cycles=true&fields=cycle,state,position_rad"
+    cycles: list[int] = []
+    with open_unix(rig, path) as connection:
+        while len(cycles) < 100:
+            message = json.loads(connection.recv(60.0))
+            if message["kind"] == "cycles":
+                assert message["rows"][0].keys() == {"cycle", "state", "position_rad"}
+                cycles += [row["cycle"] for row in message["rows"]]
+    assert all(b == a + 1 for a, b in pairwise(cycles))
+
+
 def test_live_sends_description_and_status_first_and_then_changes(rig: Rig) -> None:
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle,position_rad,tension_N") as connection:
         messages = [json.loads(connection.recv(60.0)) for _ in range(30)]
