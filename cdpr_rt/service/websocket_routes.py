@@ -265,7 +265,9 @@ class WebSocketRoutes:
         self, socket: WebSocket, rate_Hz: float, fields: tuple[str, ...], all_cycles: bool
     ) -> None:
         updates = _Updates(self._service)
-        rows = _AllCycles(self._service.block, fields) if all_cycles else None
+        # its first use in a process loads compiled code
+        made = asyncio.to_thread(_AllCycles, self._service.block, fields) if all_cycles else None
+        rows = made and await made
         async with self._viewing(socket) as gone:
             while not gone.done():
                 for message in updates.all():
