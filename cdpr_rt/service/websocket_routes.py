@@ -265,9 +265,9 @@ class WebSocketRoutes:
         self, socket: WebSocket, rate_Hz: float, fields: tuple[str, ...], all_cycles: bool
     ) -> None:
         updates = _Updates(self._service)
-        # its first use in a process loads compiled code
-        made = asyncio.to_thread(_AllCycles, self._service.block, fields) if all_cycles else None
-        rows = made and await made
+        rows = None
+        if all_cycles:  # the first use in a process loads compiled code
+            rows = await asyncio.to_thread(_AllCycles, self._service.block, fields)
         async with self._viewing(socket) as gone:
             while not gone.done():
                 for message in updates.all():
