@@ -57,14 +57,21 @@ class RecordingFolder:
         spans, self._spans = self._spans, {}
         listed = []
         for path, written_s, size in reversed(found):
-            key = (path.name, size, written_s)
-            with suppress(ProfileError, OSError):  # it may have been removed meanwhile
-                first_ns, last_ns = self._spans[key] = spans.get(key) or span_of(path)
+            is_live = str(path) == live
+            # the time of the last write shows how long the open file is, without reading it
+            key = (path.name, 0, 0.0) if is_live else (path.name, size, written_s)
+            with suppress(ProfileError, OSError, ValueError):  # removed meanwhile, or damaged
+                first_ns, last_ns = spans.get(key) or span_of(path)
+                if first_ns:  # otherwise it contains nothing yet
+                    self._spans[key] = first_ns, last_ns
+                last_ns = max(last_ns, int(written_s * 1e9)) if is_live else last_ns
+                first_ns = first_ns or last_ns or int(written_s * 1e9)
+                last_ns = max(first_ns, last_ns)
                 begin = datetime.fromtimestamp(first_ns * 1e-9, UTC).isoformat("T", "seconds")
                 one = {"begin": begin, "duration_s": (last_ns - first_ns) * 1e-9, "bytes": size}
                 session, _, part = path.stem.rpartition("-")
                 listed.append({"name": path.name, "session": session, "part": int(part), **one})
-                listed[-1]["live"] = str(path) == live
+                listed[-1]["live"] = is_live
         return listed
 
     async def read(self, waiting: Callable[[], None], *arguments: str) -> AsyncIterator[bytes]:

@@ -72,6 +72,7 @@ _ALWAYS: Final = ("time_s", "stamp_ns")
 _RECORD_HEAD, _MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 _CHUNK_TIMES: Final = struct.Struct("<QQ")
 _MAGIC_BYTES: Final = 8
+_MOST_HEADS: Final = 1_000_000
 _PLACES: Final = {name: k for k, name in enumerate(FIELDS)}
 
 CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
@@ -274,7 +275,10 @@ def span_of(path: Path) -> tuple[int, int]:
     first_ns = last_ns = 0
     with os.fdopen(open_regular(path, links=False), "rb") as file:
         file.seek(_MAGIC_BYTES)
-        while len(head := file.read(_RECORD_HEAD.size)) == _RECORD_HEAD.size:
+        for _ in range(_MOST_HEADS):
+            head = file.read(_RECORD_HEAD.size)
+            if len(head) < _RECORD_HEAD.size:
+                break
             opcode, length = _RECORD_HEAD.unpack(head)
             if opcode == Opcode.DATA_END:
                 break

@@ -34,6 +34,10 @@ def view(page: Any, name: str) -> None:
     page.get_by_role("link", name=name, exact=True).click()
 
 
+def pick(page: Any, label: str, value: str) -> None:
+    page.get_by_role("combobox", name=label, exact=True).select_option(value)
+
+
 def save(page: Any, name: str, target: Path) -> Path:
     with page.expect_download(timeout=1e3 * PATIENCE_S) as download:
         page.get_by_role("button", name=name, exact=True).first.click()
@@ -46,10 +50,10 @@ def test_the_scope_shows_every_cycle_and_exports_what_it_shows(
 ) -> None:
     with opened(browser, address(daemon)) as page:
         view(page, "Scope")
-        page.get_by_label("Quantity").select_option("position_rad")
+        pick(page, "Quantity", "position_rad")
         press(page, "Show only this")
         page.get_by_text("position of lower, rad").first.wait_for()
-        page.get_by_label("Time", exact=True).select_option("1")
+        pick(page, "Time", "1")
         before = daemon.status()["count"]["cycles"]
         until(lambda: daemon.status()["count"]["cycles"] > before + 1500)
         press(page, "Pause")
@@ -69,11 +73,11 @@ def test_a_trigger_catches_one_edge_and_cursors_measure_it(
 ) -> None:
     with opened(browser, address(daemon)) as page:
         view(page, "Scope")
-        page.get_by_label("Quantity").select_option("state")
+        pick(page, "Quantity", "state")
         press(page, "Show only this")
-        page.get_by_label("Trigger", exact=True).select_option("edge")
+        pick(page, "Trigger", "edge")
         page.get_by_label("Trigger level").fill("2.5")
-        page.get_by_label("once").check()
+        page.get_by_role("checkbox", name="once").check()
         page.get_by_text("Waiting for the trigger").wait_for()
         press(page, "Enable")
         page.get_by_role("button", name="Continue", exact=True).wait_for()
@@ -119,7 +123,7 @@ def test_objects_are_read_and_written_with_consent_without_power_only(
         press(page, "Read error, mode, voltage, current")
         page.get_by_role("cell", name="325.000 V").wait_for()
         page.get_by_text("Write an object", exact=True).first.click()
-        page.get_by_label("Value", exact=True).fill("300")
+        page.get_by_role("textbox", name="Value", exact=True).fill("300")
         write = page.get_by_role("button", name="Write 6072h:0")
         assert write.is_disabled()
         page.get_by_label("Type 6072 again to agree").fill("6072")
@@ -131,7 +135,7 @@ def test_objects_are_read_and_written_with_consent_without_power_only(
         assert write.is_disabled()
         press(page, "Power off")
         daemon.wait_for("ready")
-        page.get_by_label("Of", exact=True).select_option("lower")
+        pick(page, "Of", "lower")
         page.get_by_text("No event names lower.").wait_for()
 
 

@@ -24,7 +24,8 @@ _DIGITS: Final = 9
 class Envelope:
     """Smallest and largest values of curves (columns,) over stretches of the same number of rows.
 
-    There are at most `most` stretches: whenever there would be more, pairs of them become one.
+    There are at most `most` stretches, or twice as many of one row. Whenever there would be more,
+    pairs of them become one.
     """
 
     def __init__(self, most: int) -> None:
@@ -43,7 +44,7 @@ class Envelope:
         whole = len(joined) - len(joined) % self.each
         self._rest = joined[whole:]
         self._append(_extremes(np.repeat(joined[:whole, :, None], 2, axis=2), self.each))
-        while self._count > self._most:
+        while self._count > self._most * (2 if self.each == 1 else 1):
             one = np.concatenate(self._parts)
             self._parts, self._count = [], 0
             self.each *= 2

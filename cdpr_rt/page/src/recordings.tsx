@@ -23,7 +23,13 @@ export function Recordings() {
   const [files, setFiles] = useState<RecordingFile[] | null>(null);
   const [most, setMost] = useState(SHOWN);
   useEffect(() => {
-    const look = (): Promise<void> => store.attempt(async () => setFiles((await request<{ recordings: RecordingFile[] }>("GET", "/recordings")).recordings));
+    const look = async (): Promise<void> => {
+      try {
+        setFiles((await request<{ recordings: RecordingFile[] }>("GET", "/recordings")).recordings);
+      } catch {
+        // the list stays; the header shows that the daemon does not answer
+      }
+    };
     void look();
     const looking = setInterval(() => document.visibilityState === "visible" && void look(), LOOK_MS);
     return () => clearInterval(looking);

@@ -2,7 +2,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { linkTo, useView } from "./address";
 import { type Columns, type Description, type Quantity, request, saveAs } from "./daemon";
-import { LiveFeed, type Samples, type ScopeCurve, type Trigger, asCsv, between, curvesOf, placeOf, stepFigures, wordsOf } from "./scope_data";
+import { LiveFeed, type Samples, type ScopeCurve, type Trigger, asCsv, between, curvesOf, figure, placeOf, stepFigures, wordsOf } from "./scope_data";
 import { ScopePlot } from "./scope_plot";
 import { store, useStore } from "./store";
 import { curveColour } from "./trend";
@@ -84,7 +84,7 @@ function ScopeOf({ known, quantities, description }: { known: ScopeCurve[]; quan
               </>
             : <>
                 <a class="button" href={linkTo("scope")}>Show live values</a>
-                {zoom && recorded.each > 1 && <button onClick={() => recorded.read(zoom)}>Read this stretch in full</button>}
+                {zoom && recorded.each > 1 && <button onClick={() => recorded.read(zoom)}>Read this stretch in detail</button>}
               </>}
           {zoom && <button onClick={() => { setZoom(null); if (file !== null) recorded.read(null); }}>Show all</button>}
           <button onClick={() => exportShown(between(samples, ...shown), curves)} disabled={!samples.time_s.length}>Export as CSV</button>
@@ -126,7 +126,7 @@ function useLive(on: boolean, ids: string, curves: ScopeCurve[], trigger: Trigge
     if (!on || !curves.length) return;
     let drawn = 0;
     setPaused(false);
-    const made = (feed.current = new LiveFeed(curves, () => {
+    const made = (feed.current = new LiveFeed(curves, feed.current, () => {
       const { trigger, span_s, paused } = wanted.current, now = performance.now();
       if (paused || now - drawn < DRAW_MS) return;
       drawn = now;
@@ -271,8 +271,6 @@ function TriggerChoice({ trigger, change, curves, rearm }: { trigger: Trigger; c
   );
 }
 
-const figure = (value: number | null | undefined): string => (value == null ? "–" : +value.toPrecision(6) + "");
-
 function Cursors({ samples, window, curves, cursors, change, zoomTo }: {
   samples: Samples; window: [number, number]; curves: ScopeCurve[]; cursors: (number | null)[];
   change(cursors: (number | null)[]): void; zoomTo(from_s: number, until_s: number): void;
@@ -299,7 +297,7 @@ function Cursors({ samples, window, curves, cursors, change, zoomTo }: {
           <table>
             <thead><tr><th>curve</th><th class="right">A</th><th class="right">B</th><th class="right">B − A</th></tr></thead>
             <tbody>
-              <tr><td>time, s</td><td class="right">{figure(a)}</td><td class="right">{figure(b)}</td><td class="right">{ordered ? figure(b! - a!) : "–"}</td></tr>
+              <tr><td>time, s</td><td class="right">{a?.toFixed(4) ?? "–"}</td><td class="right">{b?.toFixed(4) ?? "–"}</td><td class="right">{ordered ? figure(b! - a!) : "–"}</td></tr>
               {curves.map((curve, number) => {
                 const first = at(number, a), second = at(number, b);
                 return (

@@ -40,6 +40,10 @@ export function curvesOf({ name, per, labels }: Quantity, description: Descripti
   });
 }
 
+/** Return a number with up to six digits. */
+export const figure = (value: number | null | undefined): string =>
+  value == null ? "–" : value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e6) ? value.toExponential(3).replace(/\.?0+e/, "e") : String(+value.toPrecision(6));
+
 /** Times and the values of curves at them, oldest first. */
 export interface Samples {
   time_s: number[];
@@ -74,6 +78,7 @@ export interface Trigger {
 
 const KEPT_S = 45;
 const RATE_Hz = 20;
+const GAP_S = 0.1;
 /** Share of the window before the trigger. */
 const BEFORE = 0.2;
 const RETRY_MS = 1000;
@@ -88,8 +93,11 @@ export class LiveFeed {
   #socket: WebSocket | null = null;
   #ended = false;
 
-  constructor(private curves: ScopeCurve[], private arrived: () => void) {
-    this.samples = { time_s: [], values: curves.map(() => []) };
+  /** `before`: the feed that this one replaces; the samples of curves that both have are kept. */
+  constructor(private curves: ScopeCurve[], before: LiveFeed | null, private arrived: () => void) {
+    const time_s = before?.samples.time_s ?? [];
+    const known = (id: string): (number | null)[] | undefined => before?.samples.values[before.curves.findIndex((one) => one.id === id)];
+    this.samples = { time_s, values: curves.map(({ id }) => known(id) ?? time_s.map(() => null)) };
     void this.#follow();
   }
 
@@ -124,6 +132,11 @@ export class LiveFeed {
         this.samples.time_s.length = 0;
         values.forEach((one) => (one.length = 0));
         this.rearm();
+      }
+      const last_s = time_s[time_s.length - 1];
+      if (last_s !== undefined && at_s - last_s > GAP_S) { // no line joins what is on both sides of a gap
+        time_s.push(last_s + 1e-6);
+        values.forEach((one) => one.push(null));
       }
       time_s.push(at_s);
       this.curves.forEach(({ field, index }, number) => {

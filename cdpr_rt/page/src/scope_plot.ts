@@ -1,6 +1,6 @@
 // The scope's plot: one vertical axis per unit, zoom by dragging, two cursors.
 import uPlot from "uplot";
-import { type Samples, type ScopeCurve } from "./scope_data";
+import { type Samples, type ScopeCurve, figure } from "./scope_data";
 import { curveColour } from "./trend";
 
 const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -26,7 +26,7 @@ export class ScopePlot {
         axes: [
           { ...axis, size: 34, grid: { width: 1, stroke: () => css("--line") }, values: (_, ticks) => ticks.map((one) => `${+one.toFixed(6)} s`) },
           ...units.map((unit, number) => ({
-            ...axis, scale: scaleOf(unit), side: number % 2 ? 1 : 3, size: 56, label: unit || "–", labelSize: 16,
+            ...axis, scale: scaleOf(unit), side: number % 2 ? 1 : 3, size: 60, values: (_: uPlot, ticks: number[]) => ticks.map(figure), label: unit || "–", labelSize: 16,
             grid: { width: 1, show: number === 0, stroke: () => css("--line") },
           })),
         ],

