@@ -7,7 +7,7 @@ requested, so a request cannot name any other file.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,7 +24,7 @@ _MOST_READERS: Final = 2
 """Largest number of recordings that are read at the same time."""
 READING_S: Final = 600.0
 """Longest time for reading one of them."""
-_TOLD_S: Final = 5.0
+_TOLD_S: Final = 1.0
 _MOST_TEXT: Final = 500
 
 
@@ -74,9 +74,12 @@ class RecordingFolder:
                 listed[-1]["live"] = is_live
         return listed
 
-    async def read(self, waiting: Callable[[], None], *arguments: str) -> AsyncIterator[bytes]:
-        """Yield the output of the process that reads a recording; call `waiting` meanwhile.
+    async def read(
+        self, waiting: Callable[[], Awaitable[None]], *arguments: str
+    ) -> AsyncIterator[bytes]:
+        """Yield the output of the process that reads a recording.
 
+        Until it comes, `waiting` is awaited every second; its exception ends the process.
         Raises RecordingsBusyError, and ValueError with its reason if it fails before any output.
         """
         if self._readers >= _MOST_READERS:
@@ -100,7 +103,7 @@ class RecordingFolder:
 
 
 async def _pieces_of(
-    process: asyncio.subprocess.Process, waiting: Callable[[], None]
+    process: asyncio.subprocess.Process, waiting: Callable[[], Awaitable[None]]
 ) -> AsyncIterator[bytes]:
     assert process.stdout is not None
     assert process.stderr is not None
@@ -108,7 +111,7 @@ async def _pieces_of(
     while True:
         reading = asyncio.ensure_future(process.stdout.read(_PIECE_BYTES))
         while not (await asyncio.wait({reading}, timeout=_TOLD_S))[0]:
-            waiting()
+            await waiting()
         if not (piece := reading.result()):
             break
         any_output = True

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import AsyncIterator
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -24,6 +23,7 @@ from cdpr_rt.service.service import Service
 
 _PIECE_BYTES: Final = 1 << 17
 _MOST_POINTS: Final = 20_000
+_CLIENT_GONE: Final = 499
 
 _NOT_THERE: Final[dict[int | str, dict[str, Any]]] = {
     404: {"model": models.Error, "description": "No such recording"},
@@ -73,7 +73,8 @@ def add_recordings(app: FastAPI, service: Service) -> None:
 
     @app.get("/recordings/{name}/columns", responses=_NOT_THERE)
     async def columns(
-        name: str, request: Request, fields: _Fields, from_s: _From = 0.0, until_s: _Until = 1e9,
+        name: str, request: Request, fields: _Fields = "", from_s: _From = 0.0,
+        until_s: _Until = 1e9,
         points: Annotated[int, Query(ge=2, le=_MOST_POINTS)] = 2000,
     ) -> models.Columns:  # fmt: skip
         """Curves for a plot: of each stretch of many cycles, the smallest and largest value."""
@@ -141,9 +142,17 @@ async def _read(
     service: Service, request: Request, headers: dict[str, str], *arguments: str
 ) -> Response:
     assert service.recordings is not None  # the recording was found
-    pieces = service.recordings.read(partial(note_progress, request.scope), *arguments)
+
+    async def waiting() -> None:
+        note_progress(request.scope)
+        if await request.is_disconnected():
+            raise ConnectionError("the client has gone")
+
+    pieces = service.recordings.read(waiting, *arguments)
     try:
         first = await anext(pieces, b"")
+    except ConnectionError:
+        return Response(status_code=_CLIENT_GONE)
     except ValueError as error:
         raise HTTPException(422, str(error)) from None
     except TimeoutError:

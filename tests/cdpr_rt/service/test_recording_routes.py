@@ -35,11 +35,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory, shared: Rig) -> Iterator[Pa
     for is_live in (False, True):
         block = SharedBlock.create(2, 1.0, 1000.0)
         block.counters["start_realtime_ns"] = time.time_ns() - (0 if is_live else 2_000_000_000)
+        block.counters["start_monotonic_ns"] = began_ns = time.monotonic_ns()
         block.write_description(DESCRIPTION)
         recorder = Recorder(block, folder, ROBOT, reserve_bytes=0)
         recorder.begin()
         writer = RowWriter(block)
-        for row in made_rows(0, 600):
+        rows = made_rows(0, 600)
+        rows["stamp_ns"] += began_ns - rows["stamp_ns"][0]
+        for row in rows:
             writer.slot()[0] = row
             writer.commit()
         recorder._take()
@@ -173,7 +176,7 @@ def test_slow_reading_delays_nothing_and_ends_with_its_client(
         began_s = time.monotonic()
         assert http.get("/status").status_code == 200
         assert time.monotonic() - began_s < 1.0
-    wait_for(lambda: recordings._readers == 0)
+    wait_for(lambda: recordings._readers == 0, 20.0)
 
 
 def test_two_recordings_are_read_at_a_time(rig: Rig, http: httpx.Client, folder: Path) -> None:
