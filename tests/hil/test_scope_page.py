@@ -75,6 +75,7 @@ def test_a_trigger_catches_one_edge_and_cursors_measure_it(
         view(page, "Scope")
         pick(page, "Quantity", "state")
         press(page, "Show only this")
+        pick(page, "Time", "1")
         pick(page, "Trigger", "edge")
         page.get_by_label("Trigger level").fill("2.5")
         page.get_by_role("checkbox", name="once").check()
