@@ -71,6 +71,7 @@ _THROTTLE_S, _MOST_THROTTLED = 1.0, 64
 answers."""
 _MOST_AT_ONCE: Final = 24
 """Largest number of requests of one client that are processed at the same time."""
+LIVE_PATH: Final = "/live"
 _MOST_PEERS: Final = 1024
 _MOST_FIELDS = 16
 STOP_PATHS: Final = frozenset(f"/{do}" for do in STOPS)
@@ -255,7 +256,8 @@ class AccessControl:
             return ""
         if not self._requests.take(who, time.monotonic()):
             raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; send fewer")
-        return who
+        is_live = scope["type"] == "websocket" and scope["path"] == LIVE_PATH
+        return "" if is_live else who  # viewers have their own limit
 
     def _check_page(self, headers: Mapping[bytes, bytes]) -> None:
         host = headers.get(b"host", b"").decode("latin-1")

@@ -18,7 +18,7 @@ from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.right import LONGEST_S
 from cdpr_rt.service import http_models as models
-from cdpr_rt.service.access_control import TokenBuckets
+from cdpr_rt.service.access_control import LIVE_PATH, TokenBuckets
 from cdpr_rt.service.lease import SHORTEST_S, LeaseError
 from cdpr_rt.service.link import Reply
 from cdpr_rt.service.recording import RowTexts
@@ -228,7 +228,7 @@ class WebSocketRoutes:
     def add(self, app: FastAPI) -> None:
         """Add both routes."""
 
-        @app.websocket("/live")
+        @app.websocket(LIVE_PATH)
         async def live(
             socket: WebSocket,
             rate_Hz: Annotated[float, Query(gt=0.0, le=FASTEST_HZ)] = 10.0,

@@ -13,10 +13,11 @@ from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
 
+import httpx
 import pytest
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, unix_connect
+from websockets.sync.client import ClientConnection, connect, unix_connect
 
 from cdpr_rt.service import websocket_routes
 from cdpr_rt.service import websocket_routes as control_socket
@@ -170,11 +171,14 @@ def test_a_flood_of_pings_without_reading_ends_the_connection(rig: Rig) -> None:
     flood.close()
 
 
-def test_the_number_of_live_clients_is_limited(rig: Rig) -> None:
+def test_one_address_may_watch_with_many_pages_up_to_a_limit(rig: Rig) -> None:
+    url, key = f"127.0.0.1:{rig.guarded_port}", {"Authorization": f"Bearer {KEY.decode()}"}
     with ExitStack() as watching:
         for _ in range(websocket_routes._MOST_LIVE):
-            watching.enter_context(open_unix(rig, "/live?rate_Hz=1"))
+            page = connect(f"ws://{url}/live?rate_Hz=1", additional_headers=key)
+            watching.enter_context(page)
         wait_for(lambda: rig.service.counts["live_clients"] == websocket_routes._MOST_LIVE)
+        assert httpx.get(f"http://{url}/description", headers=key).status_code == 200
         with open_unix(rig, "/live") as connection:
             assert closed_for(connection)[0] == control_socket.BUSY
     wait_for(lambda: rig.service.counts["live_clients"] == 0)
