@@ -262,7 +262,11 @@ _Answers = Annotated[
         Annotated[str, Field(pattern=_KEY)],
         Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")],
     ],
-    Field(max_length=80, description="Answers to the questions of `cdpr robot new`, by key."),
+    Field(
+        max_length=80,
+        description="Answers to the questions of `cdpr robot new`, by key.",
+        json_schema_extra={"additionalProperties": False},
+    ),
 ]
 
 
