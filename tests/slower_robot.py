@@ -11,14 +11,14 @@ from cdpr_profiles.places import SHIPPED
 PERIOD_S = 0.004
 
 
-def slower_robot(folder: Path, name: str | Path) -> Path:
+def slower_robot(folder: Path, name: str | Path, period_s: float = PERIOD_S) -> Path:
     """Write a robot with longer cycles. Return its file."""
-    return _slower(load_robot(name).path, folder)
+    return _slower(load_robot(name).path, folder, period_s)
 
 
-def _slower(given: Path, folder: Path) -> Path:
+def _slower(given: Path, folder: Path, period_s: float = PERIOD_S) -> Path:
     key = "sync_period_s = "
-    text, count = re.subn(rf"(?m)^{key}\S+", f"{key}{PERIOD_S}", given.read_text())
+    text, count = re.subn(rf"(?m)^{key}\S+", f"{key}{period_s}", given.read_text())
     assert count == 1
     path = folder / given.name
     path.write_text(text)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_profiles.places import SHIPPED
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.robot import Refused
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.pose_log import read_pose_log
+from tests.slower_robot import slower_robot
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
 """Tension of an inactive winch, and tension to take up slack, both with friction."""
@@ -23,14 +23,9 @@ LOOSE_N, TAKES_UP_N = 15.0, 40.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write the shipped robots with a quarter of the cycle rate, which takes less time."""
     place = tmp_path_factory.mktemp("robots")
     for name in ("spatial-8", "suspended-8"):
-        shipped = (SHIPPED / "robots" / f"{name}.toml").read_text()
-        assert "sync_period_s = 0.001" in shipped
-        (place / f"{name}.toml").write_text(
-            shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004")
-        )
+        slower_robot(place, name)
     return place
 
 
