@@ -150,6 +150,7 @@ _WAIT_S = 3.0
 _CHANGING_S = 1.0
 """A value that a client changed within this time may still be changing."""
 _PROCEDURE_STOPS: Final = "the procedure stops under control"
+_PROCEDURE_RUNS: Final = "a procedure runs the drives; cancel it, or wait for its end"
 
 
 class InjectionError(ControlError):
@@ -309,6 +310,8 @@ class Service:
             self.end_daemon()
             self.wake_launcher()
             return Reply(True, self.link.ended_how, self.link.state())
+        if do == "configure" and self.procedures.has_bus:  # two masters would run the drives
+            return Reply(False, f"{do}: {_PROCEDURE_RUNS}", self.link.state())
         stopping = do in STOPS and self._cancel_work(f"{do} by {client}")
         try:
             reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)

@@ -124,7 +124,7 @@ function Tension({ job, start }: Props) {
       </li>
       <li>
         {description!.simulated
-          ? <><p class="quiet">The robot is simulated: a simulated winch of its own hangs the masses itself.</p>
+          ? <><p class="quiet">The robot is simulated: a separate simulated winch raises the masses.</p>
             <div class="row"><button class="go" disabled={!valid || job?.running} onClick={() => void start({ procedure: "tension", axis, masses_kg: masses })}>Calibrate {axis}</button></div></>
           : <><p>Somebody hangs each mass and confirms it at a terminal. End the daemon first, then enter:</p><pre tabIndex={0}>{command}</pre></>}
       </li>

@@ -38,7 +38,7 @@ export function Commission() {
               <h3>What will happen</h3>
               <p>One motor after the other finds its encoder index, turns slowly both ways, then at up to 600 deg/s, and refines the result. It then follows a ramp with and without compensation. It gets at most a quarter of its rated torque.</p>
               <p class="quiet">{description.simulated
-                ? "The robot is simulated: the measurement runs on simulated motors of its own, without cables."
+                ? "The robot is simulated: the measurement runs on separate simulated motors, without cables."
                 : "The control loop releases the bus for this time, and takes it again afterwards. The power is off at the end."}</p>
             </li>
             <li>

@@ -87,7 +87,7 @@ export function Describe() {
           <h2 id="describe">Describe a robot</h2>
           <p>Each field has a default that follows from the fields before it. Change what differs.</p>
           <div class="row">
-            <button onClick={() => answer({})}>Start anew</button>
+            <button onClick={() => answer({})}>Start again</button>
             <Present start={() => void fromPresent()} />
           </div>
           {(shown?.notes?.length ?? 0) > 0 && <p class="busy">The form leaves out of the present robot: {shown!.notes!.join(", ")}. Add them to the file.</p>}

@@ -112,7 +112,7 @@ function Objects({ axis, drive, status }: { axis: number; drive: Drive; status: 
   const index = /^(0x)?[0-9a-f]{1,4}h?$/i.test(typed.trim()) ? parseInt(typed.trim().replace(/^0x/i, ""), 16) : NaN;
   const part = Number(sub);
   const valid = Number.isFinite(index) && /^\d{1,3}$/.test(sub.trim()) && part <= 255;
-  const whole = /^-?(\d+|0x[0-9a-f]+)$/i.test(value.trim());
+  const whole = /^(-?\d+|0x[0-9a-f]+)$/i.test(value.trim()) && Number.isSafeInteger(Number(value));
   const agreed = consent.trim().toLowerCase() === typed.trim().toLowerCase() && consent !== "";
   const powerless = status?.state === "ready" || status?.state === "inactive";
   const ask = async (some: [number, number][]): Promise<void> => {

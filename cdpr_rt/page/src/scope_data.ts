@@ -124,7 +124,7 @@ export class LiveFeed {
   }
 
   #take(message: { kind: string; rows?: Record<string, number | null | (number | null)[]>[] }): void {
-    if (message.kind !== "cycles") return;
+    if (message.kind !== "cycles" || this.#ended) return; // the next feed shares the times
     const { time_s, values } = this.samples;
     for (const row of message.rows!) {
       const at_s = row["time_s"] as number;

@@ -29,7 +29,7 @@ class Store {
   constructor() {
     this.right.changed = () => this.change();
     follow({
-      description: (value) => this.change({ description: value }),
+      description: (value) => this.change({ description: value.axes ? value : null }), // empty while the loop starts
       status: (value) => this.#look(value),
       event: (value) => this.change({ events: [value, ...this.events.filter((one) => one.number !== value.number)].slice(0, KEPT_EVENTS) }),
       cycle: (value) => this.#keep(value),

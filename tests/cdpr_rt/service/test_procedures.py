@@ -89,7 +89,7 @@ def test_a_procedure_takes_the_buses_reports_progress_and_serves_its_report(
 
 @pytest.mark.parametrize("how", ["DELETE /procedure", "POST /hold", "the right", "its client"])
 def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path, how: str) -> None:
-    with in_control(rig, 0.3 if how == "its client" else 10.0) as token:
+    with in_control(rig, 2.0 if how == "its client" else 10.0) as token:
         assert ask(rig, COMMISSION, **token).status_code == 200
         wait_for(lambda: job(rig)["steps"])
         if how == "the right":
@@ -102,6 +102,16 @@ def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path
         wait_for(lambda: not job(rig)["running"])
     assert job(rig)["result"] == {"ok": False, "stops": [1]}
     assert job(rig)["error"].startswith("ended: ")
+
+
+def test_nobody_boots_the_drives_that_a_procedure_runs(rig: Rig, folder: Path) -> None:
+    with in_control(rig) as token:
+        ask(rig, COMMISSION, **token)
+        wait_for(lambda: job(rig)["steps"])
+        answer = httpx.post(f"{rig.guarded_url}/configure", headers=RIGHT)
+        assert (answer.status_code, job(rig)["running"]) == (409, True)
+        assert "a procedure runs the drives" in answer.json()["error"]
+        assert [one["do"] for one in rig.loop.commands] == ["release"]
 
 
 def test_a_dead_service_takes_its_procedure_with_it(rig: Rig, folder: Path) -> None:
