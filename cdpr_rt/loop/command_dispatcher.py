@@ -45,6 +45,9 @@ class _Deferred:
     """State when the command arrived; `program` is the program that ran at that time."""
 
 
+_CONTROLWORD: Final = 0x6040
+
+
 class _Result(str):
     """Text of a reply to a command that succeeded."""
 
@@ -353,6 +356,8 @@ class CommandDispatcher:
             self._reading = command, machine.clock.start(read)
             return None
         self._refuse_read_only("object")
+        if index == _CONTROLWORD:
+            raise RefusedError("object: 6040h could switch a drive on; use enable and disable")
         if state not in (LoopState.INACTIVE, LoopState.READY):
             raise RefusedError(
                 f"object: written without power only, because a changed setting may move a drive; "
