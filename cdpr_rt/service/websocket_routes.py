@@ -269,13 +269,16 @@ class WebSocketRoutes:
         if all_cycles:  # the first use in a process loads compiled code
             rows = await asyncio.to_thread(_AllCycles, self._service.block, fields)
         async with self._viewing(socket) as gone:
+            due_s = time.monotonic()
             while not gone.done():
                 for message in updates.all():
                     await send(socket, json.dumps(message))
                 cycle = self._cycle(updates, fields) if rows is None else rows.text()
                 if cycle:
                     await send(socket, cycle)
-                await asyncio.wait({gone}, timeout=1.0 / rate_Hz)
+                now_s = time.monotonic()
+                due_s = max(due_s + 1.0 / rate_Hz, now_s)  # on average at the rate
+                await asyncio.wait({gone}, timeout=due_s - now_s)
 
     @asynccontextmanager
     async def _viewing(self, socket: WebSocket) -> AsyncIterator[asyncio.Task[None]]:

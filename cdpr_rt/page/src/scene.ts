@@ -249,6 +249,7 @@ export class RobotScene {
       mark.position.copy(at(obstacle_m));
       this.#path.add(mark);
     }
+    this.#path.children.forEach((one, number) => (one.renderOrder = 2 + number)); // over what is transparent
     this.done(this.#share);
   }
 
@@ -312,7 +313,8 @@ export class RobotScene {
     const centre = box.getCenter(new Vector3());
     const reach = box.getSize(new Vector3()).length();
     const from = planar ? new Vector3(0.1, 0.08, 1) : new Vector3(0.75, 0.5, 1);
-    this.#camera.position.copy(centre).addScaledVector(from.normalize(), reach * (planar ? 1.15 : 1.2));
+    const narrow = Math.max(1.2 / this.#camera.aspect, 1);
+    this.#camera.position.copy(centre).addScaledVector(from.normalize(), narrow * reach * (planar ? 1.15 : 1.2));
     this.#controls.target.copy(centre);
     this.#controls.update();
   }
