@@ -32,6 +32,8 @@ _CHANGING = frozenset({"enable", "disable", "program", "hold", "shutdown"})
 _ASIDE: Final = frozenset({"lengths", "object"})
 """Commands that cancel no deferred command."""
 _MOST_OBJECT_BYTES: Final = 500
+_CONTROLWORDS: Final = range(0x6040, 0xA000, 0x800)
+"""Controlwords of the up to eight axes of a CiA 402 drive."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +45,6 @@ class _Deferred:
     program: Program
     state: LoopState
     """State when the command arrived; `program` is the program that ran at that time."""
-
-
-_CONTROLWORD: Final = 0x6040
 
 
 class _Result(str):
@@ -356,8 +355,8 @@ class CommandDispatcher:
             self._reading = command, machine.clock.start(read)
             return None
         self._refuse_read_only("object")
-        if index == _CONTROLWORD:
-            raise RefusedError("object: 6040h could switch a drive on; use enable and disable")
+        if index in _CONTROLWORDS:
+            raise RefusedError(f"object: {index:04X}h could switch a drive on; use enable")
         if state not in (LoopState.INACTIVE, LoopState.READY):
             raise RefusedError(
                 f"object: written without power only, because a changed setting may move a drive; "

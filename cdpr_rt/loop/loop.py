@@ -150,6 +150,7 @@ class StatusPage:
             "driving": engine.driving,
             "reacting": engine.reacting.label,
             "busy": self._runner.busy,
+            "released": self._transitions.released,
             "read_only": engine.machine.read_only,
             "lockstep": lockstep,
             "real_time_factor": self._pace.factor(self._clock_ns(), bus_s) if lockstep else None,

@@ -537,6 +537,8 @@ class Status(_Answer):
     """The first of `faults` and the reaction to it, null if the reason is not a fault."""
     faults: list[dict[str, Any]]
     """All failures, the cause first: `limit`, `axis` (from 0), `name`, `code`, `text`, ..."""
+    released: bool = False
+    """Whether a procedure runs the drives instead of the loop."""
     read_only: bool
     lockstep: bool
     notices: list[str]

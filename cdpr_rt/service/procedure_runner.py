@@ -267,6 +267,8 @@ class ProcedureRunner:
                 self._error = await self._run_command(command, procedure.token_variable)
         except OSError as error:
             self._error = f"cannot be started: {error.strerror}"
+        except (KeyError, TypeError):
+            self._error = "its progress could not be read"
         finally:
             if released and not self._cut_s and (why := await self._buses(True)):
                 self._error = f"{self._error}; {why}" if self._error else why
@@ -291,10 +293,15 @@ class ProcedureRunner:
         if self._ending:
             process.send_signal(signal.SIGINT)
         assert process.stdout is not None and process.stderr is not None
-        await asyncio.gather(
-            _each_line(process.stdout, self._take), _each_line(process.stderr, self._say)
-        )
-        status = await process.wait()
+        try:
+            await asyncio.gather(
+                _each_line(process.stdout, self._take), _each_line(process.stderr, self._say)
+            )
+        except BaseException:  # the buses are taken again: the command may not run on
+            self._kill()
+            raise
+        finally:
+            status = await process.wait()
         if self._result is None:
             return f"ended with status {status}, without a result"
         return str(self._result.get("error", ""))  # without it, a status of 1 is a verdict

@@ -266,6 +266,8 @@ def next_steps(status: dict[str, Any]) -> list[str]:
     state, last = status["state"], status.get("last_stop")
     if status["read_only"] or status.get("busy") or status.get("reacting", "none") != "none":
         return []
+    if status.get("released"):  # the loop takes the drives again when the procedure ends
+        return []
     if state in ("unconfigured", "inactive") and status["reason"]:
         return ["next: remove the cause, then `cdpr check`"]
     progress = status.get("program_progress") or {}

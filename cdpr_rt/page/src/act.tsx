@@ -39,7 +39,7 @@ export function StopButton() {
 
 export function PowerOff() {
   const { status, connected } = useStore();
-  const off = connected && status?.state !== "active"; // a state that may be old disables nothing
+  const off = connected && status?.state !== "active" && !status?.released; // a state that may be old disables nothing
   return <button class="power" disabled={off} onClick={powerOff} title="Stop the motion, then switch the power off">Power off</button>;
 }
 

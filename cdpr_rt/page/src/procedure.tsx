@@ -16,7 +16,8 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
   const show = (value: Job): void => {
     const ended = latest?.running && !value.running && value.client === clientName();
     setJob((latest = value));
-    if (ended) store.right.release();
+    const { status } = store; // a motion that has begun since keeps the right
+    if (ended && (status?.state !== "active" || status.program === "hold")) store.right.release();
   };
   useEffect(() => {
     if (!connected) return;

@@ -94,7 +94,9 @@ export function situationOf(status: Status | null, description: Description | nu
     case "starting": return situation("busy", "Starting", "The control loop is starting");
     case "dead": return situation("fault", "The control loop has ended", `${status.reason}. Start it again with \`cdpr run\``);
     case "fault": return faultOf(status);
-    case "unconfigured": return situation("off", "Drives not booted", status.reason, "configure");
+    case "unconfigured": return status.released
+      ? situation("busy", "A procedure runs the drives", "The control loop takes them again when it ends")
+      : situation("off", "Drives not booted", status.reason, "configure");
     case "inactive": return situation("off", "No power", status.reason || "The drives are booted", "check");
     case "ready": return status.read_only
       ? situation("ready", "Listening only", status.reason || "Another master moves this robot")

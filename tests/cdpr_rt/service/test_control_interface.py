@@ -379,7 +379,7 @@ def test_a_command_too_long_for_the_loop_is_rejected(rig: Rig) -> None:
 
 def test_the_last_of_several_changed_values_is_an_event_with_its_client(rig: Rig) -> None:
     with rig.client() as client:
-        headers = take(client)
+        headers, began_s = take(client), time.monotonic()
         for feed in (0.3, 0.4, 0.5):
             body = {"wanted": {"feed": feed}, "client": "maria"}
             assert client.post("/set", json=body, headers=headers).status_code == 200
@@ -388,8 +388,9 @@ def test_the_last_of_several_changed_values_is_an_event_with_its_client(rig: Rig
             events = client.get("/events").json()["events"]
             return [one["text"] for one in events if one["kind"] == "set"]
 
-        wait_for(lambda: bool(found()))
-        assert found() == ["set feed 0.5 of idle by maria"]
+        changing_s = time.monotonic() - began_s
+        wait_for(lambda: "set feed 0.5 of idle by maria" in found())
+        assert len(found()) <= 1 + int(changing_s)  # a value that stays for a second is an event
 
 
 def test_objects_are_read_with_access_and_written_with_the_right_to_move(rig: Rig) -> None:

@@ -104,6 +104,22 @@ def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path
     assert job(rig)["error"].startswith("ended: ")
 
 
+def test_a_procedure_that_reports_nonsense_is_killed_before_the_buses_are_taken_again(
+    rig: Rig, tmp_path: Path
+) -> None:
+    text = 'import time; print("{\\"progress\\": {}}", flush=True); time.sleep(600)'
+    command = (sys.executable, "-c", text)
+    rig.service.procedures.plan = lambda _: Procedure(
+        "commissioning", (command,), "TOKEN", tmp_path, takes_bus=True
+    )
+    with in_control(rig) as token:
+        ask(rig, COMMISSION, **token)
+        wait_for(lambda: not job(rig)["running"])
+        assert "could not be read" in job(rig)["error"]
+        assert [one["do"] for one in rig.loop.commands] == ["release", "configure", "check"]
+    rig.service.procedures.plan = None
+
+
 def test_nobody_boots_the_drives_that_a_procedure_runs(rig: Rig, folder: Path) -> None:
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)

@@ -216,6 +216,7 @@ def test_released_buses_are_closed_and_an_emergency_stop_is_then_only_reported(
     ready.obeyed("release")
     assert ready.state is LoopState.UNCONFIGURED
     assert ready.machine.device is None
+    assert ready.status["released"]
     assert "procedure" in ready.status["reason"]
     ready.loop.request_power_off()  # whoever has the buses must obey it
     ready.turn(2)
@@ -224,6 +225,27 @@ def test_released_buses_are_closed_and_an_emergency_stop_is_then_only_reported(
     ready.obeyed("configure")
     ready.obeyed("check")
     assert ready.status["reason"] == ""
+    assert not ready.status["released"]
+
+
+def test_objects_are_read_with_power_and_written_without_but_never_a_controlword(
+    ready: LoopRig,
+) -> None:
+    torque_limit = {"axis": 0, "index": 0x6072, "sub": 0}
+    ready.obeyed("enable")
+    before = ready.command("object", **torque_limit)
+    assert before["ok"]
+    assert "without power only" in ready.command("object", **torque_limit, value=300)["text"]
+    ready.obeyed("disable")
+    for index in (0x6040, 0x6840):
+        refused = ready.command("object", axis=0, index=index, sub=0, value=0xF)
+        assert "could switch a drive on" in refused["text"]
+    ready.drop_right()
+    assert not ready.command("object", **torque_limit, value=300)["ok"]
+    ready.take_right()
+    ready.obeyed("object", **torque_limit, value=300)
+    assert ready.state is LoopState.READY
+    assert ready.command("object", **torque_limit)["text"] == before["text"]  # as booted
 
 
 def test_a_drive_fault_quick_stops_the_other_drives_and_latches(jogging: LoopRig) -> None:

@@ -127,6 +127,7 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
         ({"state": "fault"}, ["remove the cause", "`cdpr ack`, `cdpr enable`"]),
         ({"state": "fault", "reacting": "quick stop"}, []),
         ({"state": "inactive", "reason": "no boot"}, ["remove the cause, then `cdpr check`"]),
+        ({"state": "unconfigured", "reason": "a procedure runs", "released": True}, []),
         ({"state": "active"}, []),
         ({"state": "ready", "last_stop": LOWERED}, ["`cdpr enable`, `cdpr tighten`"]),
         ({"state": "active", "last_stop": LOWERED, **LOOSE}, ["`cdpr tighten`"]),
