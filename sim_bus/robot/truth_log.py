@@ -131,6 +131,11 @@ class TruthLog(RecordFile):
 # immediately, so that the last one can be read while the robot runs.
 
 
+def _motor_fields(n: int) -> list[tuple[str, str, tuple[int]]]:
+    names = ("tension_N", "motor_rad", "torque_Nm", "motor_rad_s", "power_on")
+    return [(name, "<f8", (n,)) for name in names]
+
+
 class PoseLog(RecordFile):
     """Appends records to a file; if it cannot be written, the log ends and the robot continues."""
 
@@ -144,11 +149,7 @@ class PoseLog(RecordFile):
             ("position_m", "<f8", (3,)),
             ("velocity_m_s", "<f8", (3,)),
             ("rotation", "<f8", (3, 3)),
-            ("tension_N", "<f8", (n,)),
-            ("motor_rad", "<f8", (n,)),
-            ("torque_Nm", "<f8", (n,)),
-            ("motor_rad_s", "<f8", (n,)),
-            ("power_on", "<f8", (n,)),
+            *_motor_fields(n),
         ]
         self._row = np.zeros(1, np.dtype(fields))
         self._bytes = self._row.view(np.uint8).data
@@ -212,17 +213,8 @@ class MotorsLog(RecordFile):
 
     def __init__(self, path: Path, motors: Sequence[MotorArray]) -> None:
         """Create the file; raises OSError."""
-        n = len(motors)
         self._motors = motors
-        fields = [
-            ("sync_index", "<u4"),
-            ("time_s", "<f8"),
-            ("tension_N", "<f8", (n,)),
-            ("motor_rad", "<f8", (n,)),
-            ("torque_Nm", "<f8", (n,)),
-            ("motor_rad_s", "<f8", (n,)),
-            ("power_on", "<f8", (n,)),
-        ]
+        fields = [("sync_index", "<u4"), ("time_s", "<f8"), *_motor_fields(len(motors))]
         self._row = np.zeros(1, np.dtype(fields))
         header = {
             "format": "cdpr-rt pose log 1",

@@ -130,7 +130,7 @@ def dead_loop_has_no_torque(j: Judge) -> Iterator[str]:
             yield f"axis {axis + 1} has torque {_DEAD_WITHIN_S:g} s after the loop has died"
 
 
-def falls_are_predicted(j: Judge) -> Iterator[str]:
+def falls_are_reported(j: Judge) -> Iterator[str]:
     """Whoever restarts a robot must know that its platform has fallen."""
     if j.played.dead_s is not None or j.played.recovered is not None or not j.end:
         return
@@ -234,7 +234,7 @@ def memory_is_bounded(j: Judge) -> Iterator[str]:
 
 
 INVARIANTS: Final[tuple[Invariant, ...]] = (
-    no_torque_afterwards, dead_loop_has_no_torque, falls_are_predicted, causes_are_true,
+    no_torque_afterwards, dead_loop_has_no_torque, falls_are_reported, causes_are_true,
     causes_are_named, limits_are_kept, commands_are_answered, comes_to_rest, works_again,
     no_exception, numbers_are_finite, recordings_are_complete, memory_is_bounded,
 )  # fmt: skip
