@@ -103,7 +103,7 @@ class RobotFile(Profile):
             if axis.bus not in names:
                 yield f"axes[{i}].bus", f"value {axis.bus!r}; allowed: {', '.join(names)}"
             if axis.node_id == self.master_node_id:
-                problem = f"value {axis.node_id}; allowed: another than master_node_id"
+                problem = f"value {axis.node_id}; allowed: any but master_node_id"
                 yield f"axes[{i}].node_id", problem
             first = first_on_bus.setdefault((axis.bus, axis.node_id), i)
             if first != i:

@@ -149,6 +149,19 @@ def module_command(module: str, *arguments: str) -> list[str]:
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
+_NICER: Final = 10
+MOST_KiB: Final = 4 << 20
+
+
+def module_command_beside(module: str, *arguments: str, most_KiB: int = MOST_KiB) -> list[str]:
+    """Return the command line of a module for work beside a robot: limited memory, low priority.
+
+    The limit keeps a user's file from exhausting the machine's memory.
+    """
+    within = f'ulimit -v {most_KiB} && exec nice -n{_NICER} "$@"'
+    return ["sh", "-c", within, "sh", *module_command(module, *arguments)]
+
+
 def end_by_stdin(process: subprocess.Popen[Any], timeout_s: float) -> None:
     """Close the standard input of a process that ends with it; kill it if it does not end in time.
 

@@ -54,7 +54,10 @@ def join(name: str) -> socket.socket:
         sock.send(encode({"filters": []}))
     except OSError as error:
         sock.close()
-        raise BusSetupError(f"simbus:{name}: cannot be joined: {error.strerror}") from None
+        raise BusSetupError(
+            f"simbus:{name}: no simulated bus of that name is running ({error.strerror}); "
+            "`cdpr sim up` starts one"
+        ) from None
     sock.setblocking(False)
     return sock
 

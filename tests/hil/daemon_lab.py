@@ -15,8 +15,10 @@ RIGHT = {"Authorization": f"Bearer {KEY}"}
 
 
 @contextmanager
-def running(folder: Path, *options: str, period_s: float) -> Iterator[RealDaemon]:
-    one = RealDaemon(folder, "--no-record", *options, period_s=period_s)
+def running(
+    folder: Path, *options: str, period_s: float, env: dict[str, str] | None = None
+) -> Iterator[RealDaemon]:
+    one = RealDaemon(folder, "--no-record", *options, period_s=period_s, env=env)
     try:
         yield one
     finally:

@@ -44,7 +44,9 @@ MOST_MEMORY_B, LEVEL_B = 100e6, 2e6
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
     """A daemon that stands still and answers requests, with a slow cycle."""
     folder = tmp_path_factory.mktemp("daemon")
-    with running(folder, *with_key(folder), period_s=0.01) as one:
+    # requests save robots and procedures
+    own = {f"XDG_{name}_HOME": str(folder / name) for name in ("CONFIG", "STATE")}
+    with running(folder, *with_key(folder), period_s=0.01, env=own) as one:
         yield one
 
 

@@ -230,9 +230,10 @@ def demo(
         bool, typer.Option("--no-open", help="Open no browser; print the page's address.")
     ] = False,
 ) -> None:
-    """Start a simulated robot and open its page in a browser. It runs until Ctrl-C.
+    """Start a simulated robot and open its page in a browser.
 
-    It is `cdpr run ROBOT --bus simbus: --open`. Nothing gets power until you press *Enable*.
+    It is `cdpr run ROBOT --bus simbus: --open`, and runs until Ctrl-C. Nothing gets power until you
+    press *Enable*.
     """
     run(robot, bus=["simbus:"], open_it=not no_open)
 

@@ -8,9 +8,10 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
+from typer.core import TyperGroup
 from typer.main import get_command
 
 from cdpr_drivers.bus import BusUrl
@@ -52,7 +53,7 @@ def print_unit(
     service starts.
     """
     profile = load_robot(robot)
-    with get_command(run.app).make_context("cdpr run", [robot, *context.args]) as read:
+    with _run_command().make_context("cdpr run", [robot, *context.args]) as read:
         asked = dict(read.params)
     if asked["allow_code"]:
         raise BadInputError(
@@ -72,9 +73,14 @@ def print_unit(
     typer.echo(service_unit(profile, urls, list(_words(asked)), user), nl=False)
 
 
+def _run_command() -> Any:
+    """Return `cdpr run`, which reads its options."""
+    return cast(TyperGroup, get_command(run.app)).commands["run"]
+
+
 def _words(asked: dict[str, Any]) -> Iterator[str]:
     """Yield the given options as words of a command line, with absolute paths."""
-    for parameter in get_command(run.app).params:
+    for parameter in _run_command().params:
         value = asked.get(parameter.name)
         if parameter.name in _ASIDE or value is None or value is False:
             continue

@@ -49,7 +49,7 @@ def campaign(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Play random scenarios of users' actions and faults on simulated robots, and judge them.
+    """Play random users' actions and faults on simulated robots, and judge them.
 
     A seed determines its scenario. The exit status is 1 if an invariant was violated.
     """

@@ -8,13 +8,8 @@ import time
 from typing import Any, Final
 
 from cdpr_rt.service.service import DescribingError
-from cdpr_tools.processes import module_command
+from cdpr_tools.processes import module_command_beside
 
-_NICER: Final = 10
-_MOST_KiB: Final = 4 << 20
-"""Limit of such a process' memory, so that a user's file cannot exhaust the machine's."""
-WITHIN: Final = f'ulimit -v {_MOST_KiB} && exec nice -n{_NICER} "$@"'
-"""Shell command that runs its arguments with little priority, within this limit."""
 _DESCRIBING: Final = "cdpr_tools.robots.describing"
 _DESCRIBING_S, _IDLE_S = 90.0, 120.0
 _MOST_WAITING: Final = 4
@@ -96,7 +91,7 @@ class _DescribingProcess:
         process = self._process
         if process is None or process.returncode is not None:
             process = self._process = await asyncio.create_subprocess_exec(
-                "sh", "-c", WITHIN, "sh", *module_command(_DESCRIBING),
+                *module_command_beside(_DESCRIBING),
                 stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.DEVNULL, limit=_ANSWER_BYTES,
             )  # fmt: skip

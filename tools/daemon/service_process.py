@@ -12,7 +12,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -44,10 +44,10 @@ from cdpr_tools.daemon.child import (
 )
 from cdpr_tools.daemon.drive_texts import RobotDriveTexts
 from cdpr_tools.daemon.procedures import planned
-from cdpr_tools.daemon.robot_describer import WITHIN, RobotDescriber
+from cdpr_tools.daemon.robot_describer import RobotDescriber
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, BadInputError, CommandError
-from cdpr_tools.processes import module_command
+from cdpr_tools.processes import MOST_KiB, module_command_beside
 from cdpr_tools.streams import guard_streams, outlive_output
 
 # Log lines that clients can trigger: a few of each kind a minute; the others are counted.
@@ -119,9 +119,7 @@ _MOST_FILES = 4096
 _SWITCH_S = 5e-4
 _PLANNING_S: Final = 600.0
 _LOG_FORMAT: Final = "service: %(message)s"
-_READING: Final = (
-    "sh", "-c", WITHIN, "sh", sys.executable, "-P", "-m", "cdpr_tools.recordings.reading_process",
-)  # fmt: skip
+_READING: Final = tuple(module_command_beside("cdpr_tools.recordings.reading_process"))
 
 
 class _PrintableFormatter(logging.Formatter):
@@ -296,7 +294,9 @@ _PATH_OPTIONS: Final = (
 """Options of `cdpr path show`, with their units."""
 
 
-async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tuple[int, str]:
+async def plan_in_process(
+    robot: str, file: Path, request: dict[str, Any], most_KiB: int = MOST_KiB
+) -> tuple[int, str]:
     """Plan a file for a robot's profile; return exit status and the JSON line."""
     options = [
         f"--{key.split('_', 1)[0]}={request[key]}"
@@ -304,19 +304,18 @@ async def plan_in_process(robot: str, file: Path, request: dict[str, Any]) -> tu
         if request.get(key) is not None
     ]
     given = ["path", "show", str(file), "--robot", robot, "--keep", "--json", *options]
-    return await _run_beside(*module_command("cdpr_tools.cli", *given))
+    return await _run(module_command_beside("cdpr_tools.cli", *given, most_KiB=most_KiB))
 
 
 async def border_in_process(robot: str) -> tuple[int, str]:
     """Compute the border of the workspace; return exit status and the JSON line."""
-    return await _run_beside(*module_command("cdpr_tools.robots.workspace_border", robot))
+    return await _run(module_command_beside("cdpr_tools.robots.workspace_border", robot))
 
 
-async def _run_beside(*command: str) -> tuple[int, str]:
-    """Run a command with little priority and memory; return exit status and its last line."""
+async def _run(command: Sequence[str]) -> tuple[int, str]:
+    """Run a command; return exit status and its last line."""
     process = await asyncio.create_subprocess_exec(
-        "sh", "-c", WITHIN, "sh", *command,
-        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
+        *command, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip
     try:

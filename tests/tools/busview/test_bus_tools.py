@@ -164,7 +164,11 @@ def test_a_blf_file_that_unpacks_to_too_much_is_rejected(tmp_path: Path, bomb: s
     container = struct.pack("<H6xL4x", 2, len(content)) + packed
     start = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(container), 10)
     path.write_bytes(header + start + container)
-    what = "container has more than 16777216" if bomb == "container" else "object of 16777216"
+    what = (
+        "an unpacked container has more than 16777216"
+        if bomb == "container"
+        else "object of 16777216"
+    )
     assert f"bomb.blf: {what} bytes" in complaint("replay", path)
 
 

@@ -129,7 +129,7 @@ def test_points_of_missing_poses_are_rejected(tmp_path: Path) -> None:
     require_points_of(0, path)
     path.write_text("pose,x_mm,y_mm,sigma_mm\n1,0,0\n3,0,0\n")
     require_points_of(3, path)
-    with pytest.raises(BadInputError, match=r"point of pose 3, where 2 were read"):
+    with pytest.raises(BadInputError, match="point of pose 3, but only 2 poses were read"):
         require_points_of(2, path)
 
 
