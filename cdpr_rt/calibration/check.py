@@ -140,7 +140,7 @@ class Check:
 def require_spare_length(geometry: CableGeometry) -> None:
     """Raise InvalidRequestError if lengths alone cannot check the robot."""
     directions = sum(i < 6 for i in geometry.free)
-    if geometry.n + int(geometry.turns_freely) <= directions:
+    if geometry.n + geometry.balance_readings <= directions:
         raise InvalidRequestError(_NO_SPARE_LENGTH)
 
 
@@ -272,7 +272,7 @@ class _System:
         """Return the largest error that a change causes in positions computed from lengths."""
         at = self._at
         # if a platform turns freely, the balance of moments determines the angle, not the lengths
-        rows = self._geometry.n + int(self._geometry.turns_freely)
+        rows = self._geometry.n + self._geometry.balance_rows
         x = at.by_pose[:, :rows]
         moved = np.einsum("jra,a->jr", self._by_parameter[:, :rows, own], size)
         step = np.einsum("jdr,jr->jd", np.linalg.pinv(x), moved)

@@ -487,7 +487,9 @@ class _Search:
             distance = float(np.median(np.linalg.norm(here.off_px, axis=2)))
             corner_factor = (distance / NORMAL_MEDIAN / here.camera.knowledge.noise_px) ** 2
         else:
-            unknowns = here.poses.shape[0] * len(geometry.free) + told
+            # tensions of a hanging platform are unknown; assumed ones are not readings either
+            spare = n * (1 + self._seen.tension_assumed) * geometry.hangs_freely
+            unknowns = here.poses.shape[0] * (len(geometry.free) + spare) + told
         factor = float((weighted.residual**2).sum()) / max(rows - unknowns, 1.0)
         covariance, off, slope_noise = self._with_noise_of_tensions(
             covariance, left[:, :n], hats[:, :n, :n]

@@ -144,7 +144,7 @@ def noise_seen(
 def _with_aim(geometry: CableGeometry, seen: Observations) -> Knowledge:
     """Return the knowledge with the standard deviation of rotations about their targets."""
     known, turns = geometry.knowledge, len(geometry.free) > geometry.coordinates
-    if geometry.turns_freely or not turns:
+    if geometry.balance_rows or not turns:
         return known
     aim_rad = _AIM_SHARE * geometry.model.angle_rad
     measured = np.isfinite(seen.rotation_std_rad).any(axis=1)

@@ -20,6 +20,7 @@ from cdpr_profiles.robot import default_name
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.model.cable_kernel import ANCHOR, RADIUS
+from cdpr_rt.model.kinematics import SPATIAL
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 
 ParameterKind = Literal["exit", "offset", "drum", "anchor", "pulley", "elongation"]
@@ -112,8 +113,7 @@ class CableGeometry:
         """Return the geometry of a robot's file.
 
         Elongation is not identified if the file models the cables as rigid. Raises
-        InvalidRequestError if there is no platform, or if the tilt of the platform would look like
-        errors of the geometry.
+        InvalidRequestError if there is no platform.
         """
         if robot.platform is None:
             raise InvalidRequestError(f"{robot.path}: {NO_PLATFORM}")
@@ -122,12 +122,6 @@ class CableGeometry:
             allowed = ", ".join(KINDS)
             raise InvalidRequestError(f"identified: {sorted(unknown)[0]!r}; allowed: {allowed}")
         model, n = platform_model_of(robot), len(robot.axes)
-        if model.kinematics.hangs_freely:
-            raise InvalidRequestError(
-                f"{robot.path}: platform.controlled: the platform hangs tilted on {n} cables, and "
-                "the calibration would take the tilt for errors of all drums; measure exit and "
-                "anchor points, lengths and drums by hand"
-            )
         how = robot.platform.cable_model
         cables = [axis.winch.cable for axis in robot.axes]
         soft = np.array([1.0 / cable.stiffness_N for cable in cables]) * (how != "rigid")
@@ -154,14 +148,31 @@ class CableGeometry:
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Components of the twist in which poses are estimated, including a free angle."""
+        """Components of the twist in which poses are estimated, including free angles."""
         directions = self.model.kinematics.directions
+        if self.hangs_freely:
+            return SPATIAL
         return (*directions, 5) if self.turns_freely else directions
 
     @property
     def turns_freely(self) -> bool:
         """Whether the platform turns freely in its plane until the tensions exert no moment."""
         return self.model.kinematics.turns_freely
+
+    @property
+    def hangs_freely(self) -> bool:
+        """Whether the platform hangs in space on too few cables to control its orientation."""
+        return self.model.kinematics.hangs_freely
+
+    @property
+    def balance_rows(self) -> int:
+        """Number of residuals at each pose by which the platform is in equilibrium."""
+        return 6 + self.n if self.hangs_freely else int(self.turns_freely)
+
+    @property
+    def balance_readings(self) -> int:
+        """Number of readings at each pose that the equilibrium replaces."""
+        return max(6 - self.n, 0) if self.hangs_freely else int(self.turns_freely)
 
     @cached_property
     def rows(self) -> tuple[int, ...]:

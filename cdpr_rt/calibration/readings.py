@@ -414,7 +414,7 @@ class CalibrationData(Profile):
         start = model.poses(np.array([reading.target for reading in self.poses]))
         seen = Observations.of_lengths(
             np.array([reading.length_m for reading in self.poses]),
-            self._tensions(robot, model),
+            self._tensions(robot, model, start),
             start,
         )
         jumps = tuple((cable, pose) for pose in self.restarts for cable in range(n))
@@ -422,14 +422,21 @@ class CalibrationData(Profile):
         assumed = all(reading.tension_N is None for reading in self.poses)
         return replace(seen, jumps=jumps, time_s=self._times(), tension_assumed=assumed)
 
-    def _tensions(self, robot: Robot, model: PlatformModel) -> FloatArray:
-        """Return tensions (N, n); assumed values if no tension was measured."""
+    def _tensions(self, robot: Robot, model: PlatformModel, start: FloatArray) -> FloatArray:
+        """Return tensions (N, n); assumed values if no tension was measured.
+
+        A platform that hangs freely has the tensions that the control plans at `start`.
+        """
         without = [j for j, reading in enumerate(self.poses) if reading.tension_N is None]
         if without and model.kinematics.turns_freely:
             raise InvalidRequestError(
                 f"pose {without[0] + 1} has no tension_N, but the tensions turn this platform; "
                 "record the tensions too"
             )
+        if model.kinematics.hangs_freely:
+            planned, _ = model.planned_tensions(start, np.tile(model.weight(), (len(start), 1)))
+            told = [one.tension_N or t for one, t in zip(self.poses, planned, strict=True)]
+            return np.array(told, float)
         limits = limits_of(robot)
         least_N = np.maximum(np.asarray(limits.tension_min_N, float), 0.0)
         middle = 0.5 * (least_N + np.asarray(limits.tension_max_N, float))

@@ -14,8 +14,14 @@ vector u from exit to anchor, angle θ on the pulley and compliance c_i (1 + κ)
 
 The residuals of measured positions are p + Q c - p~, those of measured rotations log(Q Q~^T). If a
 platform turns freely in its plane, Σ t_i (Q b_i × u_i) and the moment of its weight are in balance.
-Each row is divided by its standard deviation, and by the root of the number of successive readings
-that count as one.
+A platform in space that hangs on too few cables is in equilibrium, W t^ + w = 0. Its tensions t^
+agree best with the equilibrium and with the given tensions t, in weighted least squares:
+
+    t^ = argmin |W t^ + w|² / σ_w² + |t^ - t|² / σ_t²
+
+The rows are the residuals of both. Their derivatives omit those of the projection onto A = (W/σ_w,
+1/σ_t), as in the method of Kaufman for separable least squares. Each row is divided by its standard
+deviation, and by the root of the number of successive readings that count as one.
 
 Lengths hardly determine the rotation of some platforms. For these the rotation is assumed to be
 near its target: poses without a measured rotation have rows log(Q Q_t^T) with the target's rotation
@@ -46,11 +52,15 @@ from cdpr_rt.model.cable_kernel import (
     ARC,
     AXIS,
     FREE,
+    RADIUS,
     WEIGHT,
+    hang,
     run_poses,
+    write_tension_rises,
     write_unstretched_lengths,
 )
 from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.model.equilibrium_kernel import FORCE_SHARE, CENTRE_STD_m
 from cdpr_rt.model.rigid_body import G_m_s2, in_space
 
 _MISSED = 0.3
@@ -89,13 +99,15 @@ def linearise(
     run_poses(kernel, poses, cables)
     chosen = [i for i in geometry.free if i < 6]
     size = geometry.size + len(seen.jumps)
-    rows = n + int(geometry.turns_freely) + 6
+    rows = n + geometry.balance_rows + 6
     out = Linearised(
         np.zeros((count, rows)), np.zeros((count, rows, size)), np.zeros((count, rows, d))
     )
     _closure(geometry, seen, poses, jumps_m, cables, kernel, chosen, out)
     if geometry.turns_freely:
         _balance(geometry, seen, poses, cables, kernel, chosen, out)
+    elif geometry.hangs_freely:
+        _equilibrium(geometry, seen, poses, cables, kernel, out)
     _measured_poses(geometry, seen, poses, chosen, out)
     return out
 
@@ -226,6 +238,62 @@ def _balance(
         elif row - ANCHORS.start in (0, 1):
             by_this = by_anchor[..., row - ANCHORS.start]
             out.by_parameter[:, n, columns] = weight[:, None] * by_this
+
+
+def _equilibrium(
+    geometry: CableGeometry,
+    seen: Observations,
+    poses: FloatArray,
+    cables: FloatArray,
+    kernel: FloatArray,
+    out: Linearised,
+) -> None:
+    """Write the rows of a platform that hangs freely: forces, moments, tensions."""
+    n, q, platform = geometry.n, len(geometry.rows), geometry.model.platform
+    weight_N = platform.mass_kg * G_m_s2
+    known, Q = geometry.knowledge, poses[:, 1:]
+    root = math.sqrt(known.alike)
+    held = root * weight_N * np.repeat([FORCE_SHARE, CENTRE_STD_m], 3)
+    told_N = geometry.model.reserve_N if seen.tension_assumed else known.tension_N
+    rise = np.zeros(seen.tension_N.shape)
+    load = np.zeros((len(poses), 6))
+    pull, centre = np.array([0.0, 0.0, -weight_N]), Q @ in_space(platform.centre_of_mass_m)
+    load[:, :3], load[:, 3:] = pull, np.cross(centre, pull)
+    for j in range(len(poses)):
+        hang(kernel, poses[j], cables[j], load[j])
+        write_tension_rises(kernel, cables[j], rise[j])
+    A = np.concatenate([-cables[:, :6] / held[:, None], np.tile(np.eye(n), (len(poses), 1, 1))], 1)
+    A[:, 6:] /= root * told_N
+    right = np.concatenate([load / held, (rise - seen.tension_N) / (root * told_N)], axis=1)
+    basis = np.linalg.qr(A)[0]
+    across = np.eye(6 + n) - basis @ np.swapaxes(basis, 1, 2)
+    t = -np.linalg.solve(np.swapaxes(A, 1, 2) @ A, np.swapaxes(A, 1, 2) @ right[..., None])[..., 0]
+    rows = slice(n, 2 * n + 6)
+    weight = np.asarray(seen.used.all(axis=1), float)
+    out.residual[:, rows] = weight[:, None] * (across @ right[..., None])[..., 0]
+    # derivative of the wrench by the motion v of an anchor point with constant arm, (N, n, 6, 3)
+    u, arm = np.swapaxes(cables[:, :3], 1, 2), np.einsum("jab,bi->jia", Q, kernel[ANCHOR:RADIUS])
+    bent = (np.eye(3) - u[..., :, None] * u[..., None, :]) * (t / cables[:, FREE])[..., None, None]
+    moved = -np.concatenate([bent, cross_matrices(arm) @ bent], axis=2)
+    # and by the change d of the arm: -t d × u
+    turned = np.zeros_like(moved)
+    turned[..., 3:, :] = t[..., None, None] * cross_matrices(u)
+    by_twist = np.zeros((len(poses), 6, 6))
+    by_twist[..., :3] = moved.sum(axis=1)
+    by_twist[..., 3:] = -((moved + turned) @ cross_matrices(arm)).sum(axis=1)
+    by_twist[:, 3:, 3:] += cross_matrices(np.broadcast_to(pull, centre.shape)) @ cross_matrices(
+        centre
+    )
+    part = weight[:, None, None] * across[..., :6] / held
+    out.by_pose[:, rows] = part @ by_twist
+    by_anchor = (moved + turned) @ Q[:, None]
+    for place, row in enumerate(geometry.rows):
+        columns = slice(place, n * q, q)
+        if row in range(*EXIT.indices(CABLE_ROWS)):
+            out.by_parameter[:, rows, columns] = -part @ np.swapaxes(moved[..., row], 1, 2)
+        elif row in range(*ANCHORS.indices(CABLE_ROWS)):
+            own = by_anchor[..., row - ANCHORS.start]
+            out.by_parameter[:, rows, columns] = part @ np.swapaxes(own, 1, 2)
 
 
 def _measured_poses(

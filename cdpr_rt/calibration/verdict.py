@@ -51,7 +51,7 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
     d, n = len(geometry.free), geometry.n
     coordinates = np.isfinite(seen.position_std_m[:, : geometry.coordinates]).sum()
     angles = np.isfinite(seen.rotation_std_rad).sum() if d > geometry.coordinates else 0
-    told = int(seen.used.sum() + coordinates + angles) + geometry.turns_freely * seen.poses
+    told = int(seen.used.sum() + coordinates + angles) + geometry.balance_readings * seen.poses
     unknown = d * seen.poses + n * (geometry.coordinates + int("offset" in geometry.identified))
     if (
         seen.markers is not None

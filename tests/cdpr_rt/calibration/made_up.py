@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
+from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
@@ -73,6 +74,9 @@ def made_up(
         pose = Pose(array[0], array[1:])
         if file.turns_freely:
             pose = _balanced(pose, exits, anchors, tension[j])
+        if file.hangs_freely:
+            planned, _ = model.planned_tensions(array[None], model.weight()[None])
+            pose, tension[j] = _hung(true, pose, planned[0] + rng.normal(0.0, 0.5, n))
         if in_balance:
             tension[j] = _holding(true, pose, tension[j])
         held.append(pose)
@@ -106,6 +110,26 @@ def _holding(true: CableGeometry, pose: Pose, wanted_N: FloatArray) -> FloatArra
     load = np.zeros(6)
     load[2] = -true.model.platform.mass_kg * G_m_s2
     return np.asarray(wanted_N - np.linalg.pinv(wrench) @ (wrench @ wanted_N + load))
+
+
+def _hung(true: CableGeometry, pose: Pose, t: FloatArray) -> tuple[Pose, FloatArray]:
+    """Return the pose at this position, and the tensions, at rest; the last tension is given."""
+    exits, anchors = true.kernel_geometry()[:3].T, true.kernel_geometry()[3:6].T
+    platform = true.model.platform
+    weight = np.array([0.0, 0.0, -platform.mass_kg * G_m_s2])
+
+    def unbalanced(unknown: FloatArray) -> FloatArray:
+        turn, pulls = Rotation.from_rotvec(unknown[:3]), unknown[3:]
+        arms = turn.apply(anchors)
+        away = exits - pose.p - arms
+        pull = pulls[:, None] * away / np.linalg.norm(away, axis=1)[:, None]
+        moment = np.cross(arms, pull).sum(axis=0)
+        moment += np.cross(turn.apply(platform.centre_of_mass_m), weight)
+        return np.concatenate([pull.sum(axis=0) + weight, 10.0 * moment, [pulls[-1] - t[-1]]])
+
+    found = root(unbalanced, np.append(np.zeros(3), t), tol=1e-12)
+    assert found.success
+    return Pose(pose.p, Rotation.from_rotvec(found.x[:3]).as_matrix()), found.x[3:]
 
 
 def _balanced(pose: Pose, exits: FloatArray, anchors: FloatArray, t: FloatArray) -> Pose:
