@@ -65,6 +65,8 @@ def _read_candump(path: Path, data: bytes, winches: Mapping[str, Winch]) -> Tabl
             row.setdefault(TIME, frame.time_s if sync_s is None else sync_s)
             row[name] = float(value.value)
             units[name] = value.unit
+    if rows and row.keys() >= rows[-1].keys():  # the log may end within a cycle
+        rows.append(row)
     if not rows:
         ids = ", ".join(str(node) for node in nodes)
         raise ProfileError(

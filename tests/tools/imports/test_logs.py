@@ -29,8 +29,8 @@ def test_a_candump_log_gives_position_and_torque_at_each_sync(tmp_path: Path) ->
     path.write_text("\n".join(lines) + "\n")
     table = read_any(path, {"": WINCH})
     turn = 360.0 * 1024 / WINCH.encoder_counts_per_turn
-    assert table.column("6064") == pytest.approx([0.0, turn, 2 * turn])
-    assert table.column("6077") == pytest.approx([0.0, 0.3, 0.6])
+    assert table.column("6064") == pytest.approx([0.0, turn, 2 * turn, 3 * turn])
+    assert table.column("6077") == pytest.approx([0.0, 0.3, 0.6, 0.9])
     assert (table.units["6064"], table.units["6077"]) == ("deg", "Nm")
     assert table.column("time_s")[1] == pytest.approx(1700000000.001, abs=1e-6)
 

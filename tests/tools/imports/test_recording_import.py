@@ -71,6 +71,8 @@ def test_a_bus_log_of_several_drives_becomes_a_recording(tmp_path: Path) -> None
             data = struct.pack("<Hih", 0x0237, 8 * k * (i + 1), 100 * i).hex()
             at = f"({begin_s}.{1000 * k + 100 + i:06d})"
             lines.append(f"{at} can0 {0x180 + axis.node_id:03X}#{data}")
+    ends = begin_s + 1
+    lines += [f"({ends}.000000) can0 080#", f"({ends}.000100) {lines[-1].split(maxsplit=1)[1]}"]
     (tmp_path / "bus.log").write_text("\n".join(lines) + "\n")
 
     def of_axes(number: str) -> str:
@@ -83,7 +85,7 @@ def test_a_bus_log_of_several_drives_becomes_a_recording(tmp_path: Path) -> None
     out = tmp_path / "imported.mcap"
     files = (tmp_path / "bus.log", "--map", tmp_path / "map.toml")
     told = done("import", "log", "planar-3", *files, "--out", out)
-    assert told["rows"] == 499  # the last cycle may be incomplete
+    assert told["rows"] == 500  # without the last cycle, which is incomplete
     rows = exported(out)
     for i, axis in enumerate(ROBOT.axes):
         turn = 2.0 * np.pi * 8 * (i + 1) / axis.winch.encoder_counts_per_turn
