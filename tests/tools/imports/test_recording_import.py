@@ -90,7 +90,7 @@ def test_a_bus_log_of_several_drives_becomes_a_recording(tmp_path: Path) -> None
     for i, axis in enumerate(ROBOT.axes):
         turn = 2.0 * np.pi * 8 * (i + 1) / axis.winch.encoder_counts_per_turn
         angle = rows[f"position_rad[{axis.name}]"].to_numpy()
-        assert np.abs(angle - turn * np.arange(499)).max() < 1e-6
+        assert np.abs(angle - turn * np.arange(500)).max() < 1e-6
         torque = 1e-3 * 100 * i * axis.winch.motor.rated_torque_Nm
         assert rows[f"torque_actual_Nm[{axis.name}]"].to_numpy() == pytest.approx(torque)
 
