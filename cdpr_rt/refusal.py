@@ -25,7 +25,7 @@ class RefusalCode(StrEnum):
     OUT_OF_RANGE = "out_of_range"
     """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
     NOT_FEASIBLE = "not_feasible"
-    """The platform cannot hold a position, or cannot get there on a straight way (`why`; `outside`
+    """The platform cannot hold a position, or cannot get there in a straight line (`why`; `outside`
     its workspace; `enter_m`: the nearest place of the workspace, if the platform is outside)."""
     NOTHING_LEFT = "nothing_left"
     """There is nothing to continue (`left`: target or path, `instead`: the alternative)."""

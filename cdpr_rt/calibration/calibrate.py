@@ -17,12 +17,12 @@ from cdpr_rt.calibration.camera_start import camera_start
 from cdpr_rt.calibration.faults import (
     Fault,
     fit_without_faults,
+    free_wrong_values,
     hand_eye_fault,
     map_faults,
     moved_or_slipped,
     parameter_faults,
     place_faults,
-    told_right,
     without_points,
     without_slipped_points,
 )
@@ -34,7 +34,7 @@ from cdpr_rt.calibration.noise import noise_seen
 from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
 from cdpr_rt.calibration.parameters import DRUM, EXIT, CableGeometry
 from cdpr_rt.calibration.readings import Images, Observations
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.calibration.verdict import (
     Predicted3Sigma,
     absolute_3_sigma,
@@ -164,21 +164,21 @@ def _with_camera(
     start = camera_start(geometry, seen, images.setup, images.sightings)
     require_enough(geometry, start.seen.some(~held_out(start.seen)))
     known, of_points = without_slipped_points(geometry, start.seen, slack_N)
-    told = start.camera.knowledge
+    given = start.camera.knowledge
     # the given pose of the camera is used only after it agrees with the readings: a wrong pose
     # would look like faults of cables, and hide real ones
     unknown = start.camera.with_hand_eye(
-        told.position_m, told.rotation, np.array(UNKNOWN_HAND_EYE_STD)
+        given.position_m, given.rotation, np.array(UNKNOWN_HAND_EYE_STD)
     )
     found, faults = fit_without_faults(geometry, known, slack_N, unknown)
     misplaced = None
     if images.setup.hand_eye is not None:
-        misplaced = hand_eye_fault(found, told)
+        misplaced = hand_eye_fault(found, given)
         if misplaced is None:
-            found = _with_hand_eye(geometry, found, told)
-    found, wrong = told_right(geometry, found, start.map)
-    if misplaced is not None and wrong and hand_eye_fault(found, told, wrong) is None:
-        misplaced, found = None, _with_hand_eye(geometry, found, told)
+            found = _with_hand_eye(geometry, found, given)
+    found, wrong = free_wrong_values(geometry, found, start.map)
+    if misplaced is not None and wrong and hand_eye_fault(found, given, wrong) is None:
+        misplaced, found = None, _with_hand_eye(geometry, found, given)
     # if the drum radii of the file are wrong, they must not constrain the fit
     believed = replace(geometry, knowledge=found.geometry.knowledge)
     found, weighed = fit_with_noise_seen(found, believed)
@@ -196,10 +196,10 @@ def _with_camera(
     return _Whole(found, weighed, faults, known, left_out, start.map, start.known_room, used)
 
 
-def _with_hand_eye(geometry: CableGeometry, found: Fit, told: CameraKnowledge) -> Fit:
+def _with_hand_eye(geometry: CableGeometry, found: Fit, given: CameraKnowledge) -> Fit:
     """Return the fit with the hand-eye transform from its file."""
     assert found.camera is not None
-    camera = found.camera.with_hand_eye(told.position_m, told.rotation, told.hand_eye_std)
+    camera = found.camera.with_hand_eye(given.position_m, given.rotation, given.hand_eye_std)
     known = replace(geometry, knowledge=found.geometry.knowledge)
     seen = replace(found.seen, start=found.poses)
     return fit(known, seen, start=found.geometry, camera=camera)
@@ -289,7 +289,7 @@ def _by_both(found: Fit, file: CableGeometry, poses: FloatArray) -> tuple[FloatA
     geometry, seen = found.geometry, found.seen
     tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
     drum = geometry.cable[:, DRUM]
-    length = lengths_told(geometry, poses, tension)
+    length = encoder_lengths(geometry, poses, tension)
     length = (length + drum * seen.reference_m) / (1.0 + drum)
     there = replace(Observations.of_lengths(length, tension, poses), reference_m=seen.reference_m)
     by_fit, by_file = (locate(one, there).poses for one in (geometry, file))

@@ -198,17 +198,17 @@ def _places(
 ) -> tuple[Rigid, Rigid]:
     """Return the camera's pose on the platform, and the map's pose in the room."""
     cameras = Rigid(map_.camera_rotation[there], map_.camera_position_m[there])
-    told = setup.hand_eye
-    if told is None:
+    given = setup.hand_eye
+    if given is None:
         turn = turned_camera(platform[there, 1:], cameras.rotation)
         return rigid_places(platform[there], cameras, turn, None)
-    turn = exponentials(np.array(rotation_vector_rad(told.rotation_deg)))[0]
-    _require_likely(turn, platform[there, 1:], cameras.rotation, told)
-    return rigid_places(platform[there], cameras, turn, np.array(told.position_m))
+    turn = exponentials(np.array(rotation_vector_rad(given.rotation_deg)))[0]
+    _require_likely(turn, platform[there, 1:], cameras.rotation, given)
+    return rigid_places(platform[there], cameras, turn, np.array(given.position_m))
 
 
 def _require_likely(
-    turn: FloatArray, platform: FloatArray, camera: FloatArray, told: HandEye
+    turn: FloatArray, platform: FloatArray, camera: FloatArray, given: HandEye
 ) -> None:
     """Raise InvalidRequestError if the platform's turns contradict the given camera rotation."""
     try:
@@ -216,10 +216,10 @@ def _require_likely(
     except InvalidRequestError:  # the platform hardly turns, so only the given rotation is known
         return
     off_deg = math.degrees(angles(seen.T @ turn))
-    most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * told.rotation_std_deg)
+    most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * given.rotation_std_deg)
     if off_deg > most_deg:
         raise InvalidRequestError(
-            f"hand_eye.rotation_deg: value {list(told.rotation_deg)}: it differs by "
+            f"hand_eye.rotation_deg: value {list(given.rotation_deg)}: it differs by "
             f"{off_deg:.0f} deg from the one found from the platform's rotations; allowed: "
             f"up to {most_deg:.0f} deg; omit it to use the rotations alone"
         )
@@ -267,10 +267,10 @@ def _model(
     setup: CameraSetup, found: MapFit, map_: MarkerMap, hand_eye: Rigid, room: Rigid
 ) -> CameraModel:
     lens = np.array(setup.intrinsics.parameters)
-    told = setup.hand_eye
+    given = setup.hand_eye
     std = np.array(UNKNOWN_HAND_EYE_STD)
-    if told is not None:
-        std = np.repeat([told.position_std_m, np.radians(told.rotation_std_deg)], 3)
+    if given is not None:
+        std = np.repeat([given.position_std_m, np.radians(given.rotation_std_deg)], 3)
     sigmas = setup.intrinsics.sigmas
     noise = found.bundle.sigma_px
     position, rotation, known = _layout(setup, map_, room)

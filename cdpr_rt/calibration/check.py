@@ -131,10 +131,10 @@ class Check:
         if not self.moved:
             small = [f"harmless so far: {change.text}" for change in self.changes]
             return [f"UNCHANGED: {off}", *small]
-        told = [f"MOVED: {change.text}" for change in self.changes]
+        lines = [f"MOVED: {change.text}" for change in self.changes]
         if self.misfit > _MISFIT:
-            told.append("MOVED: not explained by single cables: the frame, or several cables")
-        return [off, *told]
+            lines.append("MOVED: not explained by single cables: the frame, or several cables")
+        return [off, *lines]
 
 
 def require_spare_length(geometry: CableGeometry) -> None:

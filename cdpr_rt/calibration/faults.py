@@ -38,7 +38,7 @@ _LEAST_GAIN = 16.0
 """Least ratio of that reduction to the variance of the remaining residuals (F-test)."""
 _MOST_FAULTS = 16
 _ALIKE, _MAYBE = 0.8, 0.2
-_TOLD = 0.05
+_LEAST_REDUNDANCY = 0.05
 """Least redundancy of a reading; below it, the other readings cannot show that it is wrong."""
 _ENDS = 2
 """Number of poses at both ends at which a jump looks like an outlier."""
@@ -275,8 +275,8 @@ def _worst(found: Fit) -> list[Fault]:
     n, seen = found.geometry.n, found.seen
     residual, hat, weight = _hats(found)
     redundancy = 1.0 - np.array([np.diag(h) for h in hat]).T
-    told = seen.used & (redundancy > _TOLD)
-    single = np.where(told, residual**2 / np.where(told, redundancy, 1.0), 0.0)
+    redundant = seen.used & (redundancy > _LEAST_REDUNDANCY)
+    single = np.where(redundant, residual**2 / np.where(redundant, redundancy, 1.0), 0.0)
     points = _point_gains(found)
     # compare a jump with all lengths of its cable, weighted as by the robust loss
     weights = found.weights[:, :n]
@@ -297,7 +297,7 @@ def _worst(found: Fit) -> list[Fault]:
         i = int(single[j].argmax())
     if max(points[j], single[j, i]) < _OUTLIER:
         return []
-    size = float(residual[j, i] / weight[j, i] / redundancy[j, i]) if told[j, i] else 0.0
+    size = float(residual[j, i] / weight[j, i] / redundancy[j, i]) if redundant[j, i] else 0.0
     what = "slack or caught" if size > 0.0 else "longer than it was paid out"
     alike = _alike(single[j], i)
     who = found.geometry.cables_text(i, alike, _UNSURE)
@@ -324,7 +324,9 @@ def _point_gains(found: Fit) -> FloatArray:
     hat += found.taken[:, rows] @ np.swapaxes(by_pose, 1, 2)
     spare, axes = np.linalg.eigh(np.eye(3) - hat)
     along = np.einsum("jab,ja->jb", axes, at.residual[:, rows])
-    gains = np.where(spare > _TOLD, along**2 / np.maximum(spare, _TOLD), 0.0).sum(axis=1)
+    gains = np.where(
+        spare > _LEAST_REDUNDANCY, along**2 / np.maximum(spare, _LEAST_REDUNDANCY), 0.0
+    ).sum(axis=1)
     known = np.isfinite(found.seen.position_std_m).sum(axis=1)
     return np.asarray(np.maximum(gains - 2.0 * np.maximum(known - 1, 0), 0.0))
 
@@ -357,9 +359,9 @@ def _jump_gains(residual: FloatArray, hat: FloatArray, weight: FloatArray) -> Fl
     both = np.cumsum(np.cumsum(left[::-1, ::-1], axis=0), axis=1)[::-1, ::-1]
     square = np.diag(both)
     score = np.cumsum((weight * residual)[::-1])[::-1]
-    told = square > 1e-3 * (weight**2).max(initial=1e-30)
-    told[: _ENDS + 1] = told[count - _ENDS :] = False
-    return np.asarray(np.where(told, score**2 / np.where(told, square, 1.0), 0.0))
+    enough = square > 1e-3 * (weight**2).max(initial=1e-30)
+    enough[: _ENDS + 1] = enough[count - _ENDS :] = False
+    return np.asarray(np.where(enough, score**2 / np.where(enough, square, 1.0), 0.0))
 
 
 def parameter_faults(found: Fit) -> list[Fault]:
@@ -420,7 +422,9 @@ def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
     return faults + [Fault("marker", -1, -1, 0.0, text) for text in texts]
 
 
-def hand_eye_fault(found: Fit, told: CameraKnowledge, others: Sequence[Fault] = ()) -> Fault | None:
+def hand_eye_fault(
+    found: Fit, given: CameraKnowledge, others: Sequence[Fault] = ()
+) -> Fault | None:
     """Return a fault if the camera's pose contradicts the hand-eye file, else None.
 
     `found` is a fit without that file, `others` are other faults of given values. The difference d
@@ -432,8 +436,8 @@ def hand_eye_fault(found: Fit, told: CameraKnowledge, others: Sequence[Fault] = 
     assert camera is not None
     first = found.geometry.size + found.jumps_m.size
     covariance = found.uncertainty[first : first + SIZE, first : first + SIZE]
-    covariance = covariance + np.diag(told.hand_eye_std**2)
-    moved = camera.with_hand_eye(told.position_m, told.rotation, told.hand_eye_std)
+    covariance = covariance + np.diag(given.hand_eye_std**2)
+    moved = camera.with_hand_eye(given.position_m, given.rotation, given.hand_eye_std)
     off = moved.off_known()[:SIZE]
     times = float((np.abs(off) / np.sqrt(np.diag(covariance))).max())
     square = float(off @ np.linalg.solve(covariance, off))
@@ -475,7 +479,9 @@ def moved_or_slipped(faults: Sequence[Fault]) -> list[Fault]:
     ]  # fmt: skip
 
 
-def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit, list[Fault]]:
+def free_wrong_values(
+    geometry: CableGeometry, found: Fit, first: MapFit
+) -> tuple[Fit, list[Fault]]:
     """Return the fit with wrong given values of sheets, drums or lens set free, and their faults.
 
     If one of these values is wrong, cables and camera contradict each other. Each is set free in

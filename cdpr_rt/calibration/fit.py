@@ -91,8 +91,8 @@ class NormalEquations:
             return np.zeros((0, 0)), 0.0
         inverse = np.linalg.inv(self._blocks.reduced()[0])
         both = 0.5 * (inverse + inverse.T)
-        told = float(size - np.trace(both))
-        return np.asarray(both * np.outer(self._scale, self._scale)), told
+        determined = float(size - np.trace(both))
+        return np.asarray(both * np.outer(self._scale, self._scale)), determined
 
     def left_of(self, at: Linearised) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return derivatives of rows by the parameters after elimination of the poses, (N, R, P).
@@ -138,14 +138,14 @@ def correlated(left: FloatArray, noise: FloatArray, yielding: float) -> FloatArr
     return np.asarray(yielding**2 * np.einsum("jap,jab,jbq->pq", left, across, left, optimize=True))
 
 
-def feigned(hats: FloatArray, noise: FloatArray, information: float) -> float:
+def spurious_information(hats: FloatArray, noise: FloatArray, information: float) -> float:
     """Return the spurious information n.
 
     `hats` (N, n, n) are the hat matrices of lengths, `noise` is S.
     """
     spare = np.eye(noise.shape[1]) - hats
-    told = float((spare * noise).sum())
-    return most_taken_out(max(told, 0.0), information)
+    spurious = float((spare * noise).sum())
+    return most_taken_out(max(spurious, 0.0), information)
 
 
 def most_taken_out(wanted: float, information: float) -> float:
@@ -172,15 +172,15 @@ class Elongations:
 
 
 def elongations(
-    elongation: float, known_std: float, told: float, information: float, taken_out: float
+    elongation: float, known_std: float, spurious: float, information: float, taken_out: float
 ) -> Elongations:
-    """Return both cases, if a fit with q `taken_out` has found κ; `told` is n, `information` I."""
+    """Return both cases for κ, found with q `taken_out`; `spurious` is n, `information` I."""
     by_set = (1.0 + elongation) * (information - taken_out) / information
-    by_true = by_set * information / (information - told)
+    by_true = by_set * information / (information - spurious)
     less_likely = ((by_true - 1.0) ** 2 - (by_set - 1.0) ** 2) / (2.0 * known_std**2)
     share = float(expit(-less_likely))
-    mean = information - told + share * told
-    return Elongations(by_set, by_true, share, information * share * told / mean)
+    mean = information - spurious + share * spurious
+    return Elongations(by_set, by_true, share, information * share * spurious / mean)
 
 
 def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
@@ -474,7 +474,7 @@ class _Search:
         here, weighted = self._here, self._weighted()
         geometry, n = here.geometry, here.geometry.n
         normal = self._normal(weighted, 0.0)
-        covariance, told = normal.covariance()
+        covariance, determined = normal.covariance()
         left, taken, pose_covariance = normal.left_of(weighted)
         hats = left @ covariance @ np.swapaxes(left, 1, 2)
         hats += taken @ np.swapaxes(weighted.by_pose, 1, 2)
@@ -489,7 +489,7 @@ class _Search:
         else:
             # tensions of a hanging platform are unknown; assumed ones are not readings either
             spare = n * (1 + self._seen.tension_assumed) * geometry.hangs_freely
-            unknowns = here.poses.shape[0] * (len(geometry.free) + spare) + told
+            unknowns = here.poses.shape[0] * (len(geometry.free) + spare) + determined
         factor = float((weighted.residual**2).sum()) / max(rows - unknowns, 1.0)
         covariance, off, slope_noise = self._with_noise_of_tensions(
             covariance, left[:, :n], hats[:, :n, :n]
@@ -516,9 +516,11 @@ class _Search:
         if geometry.shared:
             k = geometry.size - 1
             information = 1.0 / float(covariance[k, k])
-            told = feigned(hats, noise, information)
+            spurious = spurious_information(hats, noise, information)
             out = most_taken_out(self._taken_out, information)
-            either = elongations(geometry.elongation, float(self._known[k]), told, information, out)
+            either = elongations(
+                geometry.elongation, float(self._known[k]), spurious, information, out
+            )
             slope_noise = either.taken_out / self._seen.poses
             covariance = without(covariance, k, out)
             off = covariance[:, k] * (either.off(geometry.elongation) / float(covariance[k, k]))
@@ -621,31 +623,31 @@ def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balanc
     pull[up] = -G_m_s2
     weight[:, 3:, 1:] = np.swapaxes(np.cross(np.swapaxes(poses[:, 1:], 1, 2), pull), 1, 2)
     U, s, V = np.linalg.svd(-cables[:, chosen])
-    told, d = s > _WEAK * s.max(initial=0.0), s.shape[1]
+    determined, d = s > _WEAK * s.max(initial=0.0), s.shape[1]
     across = np.swapaxes(U, 1, 2)[:, :d] / np.maximum(s, _INERT)[..., None]
-    untold = V.copy()
-    untold[:, :d][told] = 0.0
-    V = np.where(told[..., None], V[:, :d], 0.0)
+    undetermined = V.copy()
+    undetermined[:, :d][determined] = 0.0
+    V = np.where(determined[..., None], V[:, :d], 0.0)
     pulled = (V @ tension[there][..., None])[..., 0]
-    by_mass = np.where(told[..., None], across @ weight[:, chosen], 0.0)
-    mass, _, rank, _ = np.linalg.lstsq(by_mass[told], -pulled[told], rcond=_INERT)
+    by_mass = np.where(determined[..., None], across @ weight[:, chosen], 0.0)
+    mass, _, rank, _ = np.linalg.lstsq(by_mass[determined], -pulled[determined], rcond=_INERT)
     left = pulled + by_mass @ mass
-    spare = int(told.sum()) - int(rank)
+    spare = int(determined.sum()) - int(rank)
     if spare < _LEAST_ROWS:
         return Balance(tension, free, None), np.zeros(len(there))
     tension[there] -= np.einsum("jdi,jd->ji", V, left)
     # not 1 - V^T V: if all directions are determined, rounding makes its diagonal negative
-    free[there] = np.swapaxes(untold, 1, 2) @ untold
+    free[there] = np.swapaxes(undetermined, 1, 2) @ undetermined
     std_N = math.sqrt(float((left**2).sum()) / spare)
     off_N = np.sqrt((left**2).mean(axis=1))
     return Balance(tension, free, std_N), off_N
 
 
-def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> CableGeometry:
+def with_noise_seen(found: Fit, file: CableGeometry, found_N: float | None) -> CableGeometry:
     """Return the robot's file with the accuracy of readings that a fit has found.
 
     The assumed uncertainty of encoders and torques is a guess for all robots. The equilibrium gives
-    the uncertainty of tensions, `told_N`, with a limit by the residuals of lengths. If a camera
+    the uncertainty of tensions, `found_N`, with a limit by the residuals of lengths. If a camera
     determines the poses, the residuals of lengths also give the uncertainty of lengths, so that
     lengths and corners are weighted correctly. Uncertainties are only reduced, never increased.
     """
@@ -658,7 +660,7 @@ def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> Ca
         squares = float((soft**2 * free).mean())
     before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
     variance = found.variance_factor * known.alike * before
-    tension_N = max(told_N or guess.tension_N, _LEAST_N)
+    tension_N = max(found_N or guess.tension_N, _LEAST_N)
     if squares > 0.0 and yielding > 0.0:
         tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)
     length_m = guess.length_m
@@ -675,28 +677,28 @@ def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeom
     From the second round on, the elongation is the mean of two cases: true tensions scatter about
     the given ones, or given tensions scatter about the true ones.
     """
-    told, slope_noise = found.seen, 0.0
+    given, slope_noise = found.seen, 0.0
     weighed = file
     for _ in range(_ROUNDS):
-        balanced = balance(found, told)
+        balanced = balance(found, given)
         weighed = with_noise_seen(found, file, balanced.std_N)
         weighed = replace(weighed, knowledge=replace(weighed.knowledge, slope_noise=slope_noise))
-        found = _weighed_fit(found, weighed, told, balanced)
+        found = _weighed_fit(found, weighed, given, balanced)
         slope_noise = found.slope_noise
     return found, weighed
 
 
-def weighed_fit(found: Fit, weighed: CableGeometry, told: Observations) -> Fit:
-    """Return another fit, with balanced tensions of `told` and the weights of `weighed`.
+def weighed_fit(found: Fit, weighed: CableGeometry, given: Observations) -> Fit:
+    """Return another fit, with balanced tensions of `given` and the weights of `weighed`.
 
     If the balance finds errors of the tensions that are so large that the lengths contradict them,
     another force acts on the platform, and the tensions are not corrected.
     """
-    return _weighed_fit(found, weighed, told, balance(found, told))
+    return _weighed_fit(found, weighed, given, balance(found, given))
 
 
-def _weighed_fit(found: Fit, weighed: CableGeometry, told: Observations, balanced: Balance) -> Fit:
+def _weighed_fit(found: Fit, weighed: CableGeometry, given: Observations, balanced: Balance) -> Fit:
     if (balanced.std_N or math.inf) <= _BELIEVED * weighed.knowledge.tension_N:
-        told = balanced.of(told)
-    seen = replace(told, start=found.poses)
+        given = balanced.of(given)
+    seen = replace(given, start=found.poses)
     return fit(weighed, seen, start=found.geometry, camera=found.camera)

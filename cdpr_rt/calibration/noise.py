@@ -31,9 +31,9 @@ MOST_READINGS = 250
 """Number of readings of a moving platform that a fit uses."""
 _ROUNDS = 6
 _NORMAL_MEDIAN = 0.6745
-_TOLD = 0.1
+_LEAST_REDUNDANCY = 0.1
 """Least redundancy of a residual that is used for a scale."""
-_LEAST_TOLD = 20
+_LEAST_RESIDUALS = 20
 """Least number of residuals for a scale."""
 _LARGER, _SAME = 1.3, 1.1
 """Scale above which the noise of a platform at rest is larger than assumed; scale below which a
@@ -73,36 +73,36 @@ class NoiseSeen:
 
     def lines(self) -> list[str]:
         """Return the noise as lines of text; empty if it is as assumed."""
-        known, seen, told = self.geometry.knowledge, self.seen, []
+        known, seen, lines = self.geometry.knowledge, self.seen, []
         if known.length_m > _SAME * self.assumed_length_m or seen.time_s is not None:
-            told.append(
+            lines.append(
                 f"noise of the lengths by the data: {1e3 * known.length_m:.2f} mm (standard "
                 f"deviation; {1e3 * self.assumed_length_m:.2f} mm was assumed)"
             )
         if seen.every > 1 or seen.time_s is not None:
             used = "all readings are" if seen.every == 1 else f"one reading in {seen.every} is"
-            told.append(f"{used} used, {seen.poses} in all")
+            lines.append(f"{used} used, {seen.poses} in all")
         if known.alike > 1.0:
-            told.append(
+            lines.append(
                 f"errors of successive readings are alike: {known.alike:.1f} readings count as one"
             )
         if seen.time_s is None:
-            return told
+            return lines
         measured = np.isfinite(seen.position_std_m)
         if measured.any():
             std_mm = 1e3 * float(np.median(seen.position_std_m[measured]))
-            told.append(f"noise of the measured points: {std_mm:.2f} mm (standard deviation)")
+            lines.append(f"noise of the measured points: {std_mm:.2f} mm (standard deviation)")
         if self.glitches:
-            told.append(
+            lines.append(
                 f"{self.glitches} measured points or rotations jump for a moment and are left out"
             )
         if self.offset_std_s:
-            told.append(
+            lines.append(
                 f"time offset: measured points are {1e3 * self.offset_s:+.1f} ms (± "
                 f"{3e3 * self.offset_std_s:.1f} ms, 3 sigma) later than the lengths with the same "
                 "number; it is corrected"
             )
-        return told
+        return lines
 
     def as_json(self) -> dict[str, object]:
         """Return the noise as JSON."""
@@ -148,7 +148,7 @@ def _with_aim(geometry: CableGeometry, seen: Observations) -> Knowledge:
         return known
     aim_rad = _AIM_SHARE * geometry.model.angle_rad
     measured = np.isfinite(seen.rotation_std_rad).any(axis=1)
-    if measured.sum() >= _LEAST_TOLD:
+    if measured.sum() >= _LEAST_RESIDUALS:
         turn = seen.rotation[measured] @ np.swapaxes(seen.target_rotation[measured], 1, 2)
         cosine = np.clip(0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0), -1.0, 1.0)
         seen_rad = float(np.median(np.arccos(cosine))) / _NORMAL_MEDIAN
@@ -168,10 +168,10 @@ def _scale(found: Fit, rows: slice) -> float:
     own *= np.sqrt(found.weights[:, rows])
     left = found.left[:, rows]
     spare = 1.0 - own - np.einsum("jap,pq,jaq->ja", left, information, left, optimize=True)
-    told = (spare > _TOLD) & (np.abs(at.by_pose[:, rows]).max(axis=2) > 0.0)
-    if told.sum() < _LEAST_TOLD:
+    usable = (spare > _LEAST_REDUNDANCY) & (np.abs(at.by_pose[:, rows]).max(axis=2) > 0.0)
+    if usable.sum() < _LEAST_RESIDUALS:
         return 1.0
-    off = np.abs(at.residual[:, rows][told]) / np.sqrt(spare[told])
+    off = np.abs(at.residual[:, rows][usable]) / np.sqrt(spare[usable])
     return math.sqrt(found.geometry.knowledge.alike) * float(np.median(off)) / _NORMAL_MEDIAN
 
 
@@ -185,7 +185,7 @@ def _by_data(
     seen, first = _thinned(whole, every), geometry.knowledge.length_m
     points = seen.position_std_m, seen.rotation_std_rad
     offset_s = offset_std_s = 0.0
-    timed = whole.time_s is not None and int(seen.measured.sum()) >= _LEAST_TOLD
+    timed = whole.time_s is not None and int(seen.measured.sum()) >= _LEAST_RESIDUALS
     # wrong drums in the file would look like noise, and this noise would bind the fit to the file
     geometry = _with_drums(geometry, _LOOSE_DRUM)
     for _ in range(_ROUNDS):
@@ -222,14 +222,14 @@ def _without_glitches(geometry: CableGeometry, seen: Observations) -> tuple[Obse
     known = np.isfinite(np.column_stack([seen.position_std_m, seen.rotation_std_rad]))
     wrong = np.zeros((seen.poses, 2), bool)
     for kind, columns in enumerate((slice(0, 3), slice(3, 6))):
-        told = known[:, columns].any(axis=1)
-        if told.sum() < _LEAST_TOLD:
+        usable = known[:, columns].any(axis=1)
+        if usable.sum() < _LEAST_RESIDUALS:
             continue
-        part = np.where(known[told, columns], off[told, columns], 0.0)
+        part = np.where(known[usable, columns], off[usable, columns], 0.0)
         beside = median_filter(part, size=(_BESIDE, 1), mode="nearest")
         away = np.linalg.norm(part - beside, axis=1)
         far = _GLITCH * np.median(away) / _NORMAL_MEDIAN + (_LEAST_rad if kind else _LEAST_m)
-        wrong[told, kind] = away > far
+        wrong[usable, kind] = away > far
     nowhere = np.where(wrong[:, :1], np.inf, seen.position_std_m)
     unturned = np.where(wrong[:, 1:], np.inf, seen.rotation_std_rad)
     seen = replace(seen, position_std_m=nowhere, rotation_std_rad=unturned)

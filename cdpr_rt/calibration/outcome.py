@@ -111,7 +111,7 @@ class Outcome:
         return self.predicted.position_mm
 
     @property
-    def told_from_file(self) -> bool:
+    def differs_from_file(self) -> bool:
         """Whether the readings show a significant difference from the robot's file.
 
         Parameters change by more than noise, and the change has an effect: positions or
@@ -134,43 +134,43 @@ class Outcome:
 
     def objections(self) -> list[str]:
         """Return the objections to adopting the calibration, each with the action to take."""
-        found, told = self.found, []
+        found, found_wrong = self.found, []
         if not found.converged:
-            told.append(
+            found_wrong.append(
                 "the fit did not converge: its start is too far off, or the data contradict "
                 "each other"
             )
         if found.variance_factor > _MISFIT:
-            told.append(
+            found_wrong.append(
                 f"lengths disagree {math.sqrt(found.variance_factor):.1f} times as much as "
                 "expected: a part that should be fixed moves (an anchor, a pulley, a frame)"
             )
-        told += [
+        found_wrong += [
             fault.text
             for fault in self.faults
             if fault.kind == "points" or fault.text.startswith(UNDECIDED)
         ]
         if found.corner_factor > _MISFIT:
-            told.append(
+            found_wrong.append(
                 f"corners fit {math.sqrt(found.corner_factor):.1f} times worse together with "
                 "the cables than alone: the camera moved on the platform, or the platform "
                 "moved while images were taken"
             )
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
-            told.append(f"{len(left_out)} readings contradict the others: measure again")
-        told += self._too_uncertain()
-        if self.worse and (self.told_from_file or self.adopt):
-            told.append(
+            found_wrong.append(f"{len(left_out)} readings contradict the others: measure again")
+        found_wrong += self._too_uncertain()
+        if self.worse and (self.differs_from_file or self.adopt):
+            found_wrong.append(
                 "at the poses kept for verification the errors are significantly larger than with "
                 "the robot's file: take more poses, further apart"
             )
         if self.method == "camera" and self.verified.kind == "none":
-            told.append(
+            found_wrong.append(
                 "fewer than three held-out poses show two markers of the map, so the "
                 "calibration is not verified: take more poses, or lay out more sheets"
             )
-        return told + self._points() + self._islands() + self._impossible()
+        return found_wrong + self._points() + self._islands() + self._impossible()
 
     def _too_uncertain(self) -> list[str]:
         """Return objections if the predicted error is large, or the actual error much larger.
@@ -211,20 +211,20 @@ class Outcome:
         """Return objections to the measured points: too many are wrong, or too few verify."""
         kinds = [fault.kind for fault in self.faults]
         wrong, used = kinds.count("point"), int(self.found.seen.measured.sum())
-        told = []
+        objections = []
         if wrong > _MOST_POINTS_LEFT_OUT * (wrong + used):
-            told.append(
+            objections.append(
                 f"{wrong} of {wrong + used} measured points contradict the others: measure again"
             )
         verifying = len(self.verified.errors_m)
         by_points = self.method == "points" or self.verifying_points_left_out > 0
         if by_points and "points" not in kinds and verifying < LEAST_VERIFYING:
-            told.append(
+            objections.append(
                 f"not verified: the position was measured at {verifying} of the held-out poses, "
                 f"but {LEAST_VERIFYING} are needed: measure all coordinates at "
                 f"{2 * LEAST_VERIFYING} poses or more, far apart"
             )
-        return told
+        return objections
 
     def _islands(self) -> list[str]:
         """Return the markers that no image connects with the others, thesis, section 3.7.3.
@@ -242,7 +242,7 @@ class Outcome:
     def insignificance(self) -> str | None:
         """Return the reason why the change is not significant; None if it is significant."""
         change = self.change
-        if self.told_from_file:
+        if self.differs_from_file:
             return None
         moved = f"positions would move by {1e3 * change.moved_m:.2f} mm (root mean square)"
         if change.by_noise:
@@ -382,10 +382,10 @@ class Outcome:
             "verdict": self.verdict(),
             "objections": self.objections(),
             "change": {
-                "significant": self.told_from_file,
+                "significant": self.differs_from_file,
                 "chance": self.change.chance,
                 "chi_squared": self.change.chi_squared,
-                "parameters_told": self.change.degrees_of_freedom,
+                "parameters_determined": self.change.degrees_of_freedom,
                 "positions_move_by_mm": 1e3 * self.change.moved_m,
             },
             "poses": self.found.seen.poses,

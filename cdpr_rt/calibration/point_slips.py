@@ -240,11 +240,11 @@ class _ByLengths:
             bad += 1
             W = _without(W, slice(worst * k, (worst + 1) * k))
         fixed = _POINT_COST * bad + slip.cost + 2.0 * columns.shape[1]
-        all_W, costs, size_told = [W], [float(y @ W @ y) + fixed], _log_size(W, used)
+        all_W, costs, size_of_all = [W], [float(y @ W @ y) + fixed], _log_size(W, used)
         for times in _NOISIER[1:]:
             W = _inverse(common, times**2 * noise, used)
             all_W.append(W)
-            costs.append(float(y @ W @ y) + fixed + size_told - _log_size(W, used))
+            costs.append(float(y @ W @ y) + fixed + size_of_all - _log_size(W, used))
         squares = float(y @ all_W[0] @ y)
         free = columns.T @ all_W[0] @ y
         return _Score(
@@ -564,4 +564,4 @@ def _text(slip: _Slip, points: Points, score: _Score) -> tuple[str, float]:
         text = f"{which} belong {far}"
     else:
         text = f"the measured points of poses {rest.replace(';', ', and of')} are exchanged"
-    return text + (", and their origin is another" if rest.endswith("and shift") else ""), size
+    return text + (", and their origin is shifted" if rest.endswith("and shift") else ""), size

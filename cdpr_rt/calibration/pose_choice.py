@@ -15,7 +15,7 @@ from cdpr_rt.calibration.parameters import (
     ParameterKind,
 )
 from cdpr_rt.calibration.readings import Observations
-from cdpr_rt.calibration.residuals import lengths_told, linearise
+from cdpr_rt.calibration.residuals import encoder_lengths, linearise
 from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.model.cable_kernel import run_poses
 from cdpr_rt.model.platform_model import PlatformModel
@@ -65,9 +65,9 @@ def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntAr
             most[chosen], fresh[chosen] = _gains(rows[chosen], covariance), True
         taken.append(best)
         most[best] = -np.inf
-        told = covariance @ rows[best].T
-        inner = np.eye(rows.shape[1]) + rows[best] @ told
-        covariance = covariance - told @ np.linalg.solve(inner, told.T)
+        gained = covariance @ rows[best].T
+        inner = np.eye(rows.shape[1]) + rows[best] @ gained
+        covariance = covariance - gained @ np.linalg.solve(inner, gained.T)
     return np.array(taken)
 
 
@@ -86,7 +86,7 @@ def pose_rows(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
     """
     m, n, size, free = len(poses), geometry.n, geometry.size, list(geometry.free)
     tension = np.tile(0.5 * (geometry.model.low_N + geometry.model.high_N), (m, 1))
-    seen = Observations.of_lengths(lengths_told(geometry, poses, tension), tension, poses)
+    seen = Observations.of_lengths(encoder_lengths(geometry, poses, tension), tension, poses)
     at = linearise(geometry, seen, poses, np.zeros(0))
     sigma = np.repeat([POSITION_m, ROTATION_rad], 3)[:, None]
     by_pose = np.zeros((m, n + 6, len(free)))

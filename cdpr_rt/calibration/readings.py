@@ -448,15 +448,15 @@ class CalibrationData(Profile):
         times = [reading.time_s for reading in self.poses]
         if all(time is None for time in times):
             return None
-        told = np.array([math.nan if time is None else time for time in times])
-        bad = ~np.isfinite(told)
-        bad[1:] |= ~(np.diff(told) > 0.0)
+        time_s = np.array([math.nan if time is None else time for time in times])
+        bad = ~np.isfinite(time_s)
+        bad[1:] |= ~(np.diff(time_s) > 0.0)
         if bad.any():
             raise InvalidRequestError(
                 f"pose {int(bad.argmax()) + 1}: time_s is missing or not later than that of the "
                 "pose before; sort the poses by time, and give all of them a time, or none"
             )
-        return told
+        return time_s
 
     def sightings(self) -> list[Sighting]:
         """Return the markers in the images of all poses; empty if there is no image."""

@@ -124,7 +124,9 @@ def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
     return np.asarray(math.sqrt(known.alike) * np.hypot(known.length_m, uncertain))
 
 
-def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
+def encoder_lengths(
+    geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray
+) -> FloatArray:
     """Return the encoder lengths (N, n) at poses (N, 4, 3), without drum errors."""
     cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))
     run_poses(geometry.kernel_geometry(), poses, cables)

@@ -21,7 +21,7 @@ from cdpr_rt.calibration.parameters import (
     CableGeometry,
 )
 from cdpr_rt.calibration.readings import Observations
-from cdpr_rt.calibration.residuals import Linearised, lengths_told, linearise
+from cdpr_rt.calibration.residuals import Linearised, encoder_lengths, linearise
 from cdpr_rt.errors import InvalidRequestError
 
 _OPEN = 0.5
@@ -51,24 +51,24 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
     d, n = len(geometry.free), geometry.n
     coordinates = np.isfinite(seen.position_std_m[:, : geometry.coordinates]).sum()
     angles = np.isfinite(seen.rotation_std_rad).sum() if d > geometry.coordinates else 0
-    told = int(seen.used.sum() + coordinates + angles) + geometry.balance_readings * seen.poses
+    readings = int(seen.used.sum() + coordinates + angles) + geometry.balance_readings * seen.poses
     unknown = d * seen.poses + n * (geometry.coordinates + int("offset" in geometry.identified))
     if (
         seen.markers is not None
     ):  # an image gives the camera's pose in the map, which has a separate frame
-        told += d * len(np.unique(seen.markers.image))
+        readings += d * len(np.unique(seen.markers.image))
         unknown += 12
-    each = told / max(seen.poses, 1) - d
-    if told >= unknown + _LEAST_SPARE:
+    each = readings / max(seen.poses, 1) - d
+    if readings >= unknown + _LEAST_SPARE:
         return
     if each <= 0.0:
         raise InvalidRequestError(
             f"{n} cables and {d} directions have no redundancy to calibrate with; give "
             "measured points (--points)"
         )
-    missing = int(np.ceil((unknown + _LEAST_SPARE - told) / each))
+    missing = int(np.ceil((unknown + _LEAST_SPARE - readings) / each))
     raise InvalidRequestError(
-        f"{seen.poses} poses with {told} readings are too few for {unknown} unknowns; "
+        f"{seen.poses} poses with {readings} readings are too few for {unknown} unknowns; "
         f"take at least {missing} more poses of this kind, or measured points"
     )
 
@@ -142,11 +142,11 @@ def _of_single_cables(
     for column in shown.T:
         most = np.argsort(-np.abs(column))[:2]
         chosen = [int(i) for i in most if column[i] ** 2 > 0.15] or [int(most[0])]
-        told = [names[i] for i in chosen]
+        large = [names[i] for i in chosen]
         of_cables = geometry.n * len(geometry.rows)
         numbers = {i // len(geometry.rows) for i in chosen if i < of_cables}
         cables = [geometry.cable_name(number) for number in sorted(numbers)]
-        if told == ["elongation"]:
+        if large == ["elongation"]:
             advice = "add poses at which tensions differ more, or use the cable's data sheet"
         else:
             advice = "add poses further apart, where its length and direction change more"
@@ -154,7 +154,7 @@ def _of_single_cables(
                 advice += ", and poses with other rotations"
             advice += f" ({', '.join(cables)})" if cables else ""
         rest = float(column @ variance @ column)
-        found.append(OpenDirection(" with ".join(told), advice, rest))
+        found.append(OpenDirection(" with ".join(large), advice, rest))
     return found
 
 
@@ -294,7 +294,7 @@ def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:
 def _at(found: Fit, poses: FloatArray) -> Linearised:
     geometry, seen = found.geometry, found.seen
     tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
-    lengths = lengths_told(geometry, poses, tension)
+    lengths = encoder_lengths(geometry, poses, tension)
     there = Observations.of_lengths(lengths, tension, poses)
     there = replace(there, reference_m=seen.reference_m)
     geometry = replace(geometry, knowledge=replace(geometry.knowledge, alike=1.0))

@@ -17,7 +17,7 @@ from cdpr_rt.calibration.camera_start import (
     markers_of_map,
     start_on_map,
 )
-from cdpr_rt.calibration.faults import fit_without_faults, told_right, without_slack
+from cdpr_rt.calibration.faults import fit_without_faults, free_wrong_values, without_slack
 from cdpr_rt.calibration.fit import Fit, locate, weighed_fit
 from cdpr_rt.calibration.markers.geometry import logarithms
 from cdpr_rt.calibration.markers.map_fit import MapFit
@@ -46,17 +46,20 @@ class Scale:
     for fewer than three poses."""
 
     @classmethod
-    def of(cls, told_m: FloatArray, measured_m: FloatArray) -> Scale:
+    def of(cls, computed_m: FloatArray, measured_m: FloatArray) -> Scale:
         """Return the ratio of measured (M, k) to computed (M, k) distances, for all pairs together.
 
         s^2 = sum |q_i - q_j|^2 / sum |p_i - p_j|^2; section 3.8 of the thesis discusses the scale.
         """
-        count = len(told_m)
-        if count < _LEAST_POSES or not np.ptp(told_m, axis=0).any():
+        count = len(computed_m)
+        if count < _LEAST_POSES or not np.ptp(computed_m, axis=0).any():
             return cls(float("nan"), float("nan"))
-        factor = _ratio(told_m, measured_m)
+        factor = _ratio(computed_m, measured_m)
         less = np.array(
-            [_ratio(*(np.delete(p, j, axis=0) for p in (told_m, measured_m))) for j in range(count)]
+            [
+                _ratio(*(np.delete(p, j, axis=0) for p in (computed_m, measured_m)))
+                for j in range(count)
+            ]
         )
         return cls(factor, float(np.sqrt((count - 1) * less.var())))
 
@@ -66,9 +69,9 @@ class Scale:
         return f"{self.factor:.5f} ± {3.0 * self.std:.5f}"
 
 
-def _ratio(told_m: FloatArray, measured_m: FloatArray) -> float:
+def _ratio(computed_m: FloatArray, measured_m: FloatArray) -> float:
     # sums over pairs are proportional to sums of squares about the mean
-    squares = [float(((p - p.mean(axis=0)) ** 2).sum()) for p in (measured_m, told_m)]
+    squares = [float(((p - p.mean(axis=0)) ** 2).sum()) for p in (measured_m, computed_m)]
     return float(np.sqrt(squares[0] / max(squares[1], 1e-12)))
 
 
@@ -79,7 +82,7 @@ class Verification:
     poses: int
     errors_m: FloatArray
     """Positions by lengths minus measured ones, (M, k)."""
-    told_m: FloatArray
+    computed_m: FloatArray
     """Positions by lengths, (M, k)."""
     turn_errors_rad: FloatArray
     """Errors of measured rotations, (M, 3)."""
@@ -126,7 +129,7 @@ class Verification:
     @property
     def scale(self) -> Scale:
         """Ratio of measured distances between the poses to those by lengths."""
-        return Scale.of(self.told_m, self.told_m - self.errors_m)
+        return Scale.of(self.computed_m, self.computed_m - self.errors_m)
 
     def worse_than(self, before: Verification) -> bool:
         """Return whether errors are larger than those of `before`, by more than noise explains.
@@ -176,17 +179,17 @@ def verify(
 
     If only the camera has measured, the reference is the poses determined by the camera alone.
     """
-    told = seen.without_jumps(jumps_m)
-    there = locate(geometry, told)
-    off = there.length_residual_m * length_std_m(there.geometry, told)
+    corrected = seen.without_jumps(jumps_m)
+    there = locate(geometry, corrected)
+    off = there.length_residual_m * length_std_m(there.geometry, corrected)
     squares = np.asarray((off**2).sum(axis=1))
     rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
     k = geometry.coordinates
     if camera is not None and not verifies(seen):
         seen = replace(seen, start=there.poses)
-        errors, told_m, turns = _beside_camera(geometry, camera, seen)
+        errors, computed_m, turns = _beside_camera(geometry, camera, seen)
         return Verification(
-            seen.poses, errors[:, :k], told_m[:, :k], turns, rms, squares, by_camera=True
+            seen.poses, errors[:, :k], computed_m[:, :k], turns, rms, squares, by_camera=True
         )
     p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
     errors = np.where(np.isfinite(seen.position_std_m), p - seen.position_m, np.nan)[:, :k]
@@ -387,7 +390,7 @@ def hold_out(
     held = held_out(seen)
     part, _ = fit_without_faults(geometry, seen.some(~held), slack_N, whole.camera)
     if first_map is not None:
-        part, _ = told_right(geometry, part, first_map)
+        part, _ = free_wrong_values(geometry, part, first_map)
     part = weighed_fit(part, weighed, part.seen)
     kept, index = np.flatnonzero(~held), np.flatnonzero(held)
     slipped = part.seen.jumps[len(seen.jumps) :]  # jumps found at the other poses
@@ -430,6 +433,6 @@ def with_more_poses(found: Fit, more: int = MORE) -> Fit:
     factor = max(found.variance_factor, 1.0)
     C = found.covariance[:size, :size] / np.outer(known, known) / factor
     shares, vectors = np.linalg.eigh(0.5 * (C + C.T))
-    told = np.maximum(1.0 / np.maximum(shares, 1e-12) - 1.0, 0.0) * (poses + more) / poses
-    C = (vectors / (1.0 + told)) @ vectors.T * np.outer(known, known) * factor
+    information = np.maximum(1.0 / np.maximum(shares, 1e-12) - 1.0, 0.0) * (poses + more) / poses
+    C = (vectors / (1.0 + information)) @ vectors.T * np.outer(known, known) * factor
     return replace(found, covariance=C, attenuation=found.attenuation[:size])

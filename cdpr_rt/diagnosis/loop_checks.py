@@ -101,12 +101,12 @@ def turned_by_friction(s: Subject) -> str:
             share = _held_share(s.statics, q[:k], model.kinematics.directions[i] - 3, turned[i])
             if share < worst:
                 worst = share
-                told = float(np.sqrt(np.linalg.inv(J.T @ J)[i, i])) * 1e-3
+                per_mm_rad = float(np.sqrt(np.linalg.inv(J.T @ J)[i, i])) * 1e-3
                 text = (
                     f"friction of {friction_N:.2g} N, usual for such winches, turns the "
                     "platform by "
                     f"{math.degrees(turned[i]):.2g} deg{_about(model, i)} until the control "
-                    f"overcomes it (1 mm of each cable is {math.degrees(told):.2g} "
+                    f"overcomes it (1 mm of each cable is {math.degrees(per_mm_rad):.2g} "
                     f"deg); at {point_text(q[:k])} m the cables can hold it turned by at most "
                     f"{math.degrees(share * turned[i]):.2g} deg: longer arms to the anchor points, "
                     "more cables, or winches with a smaller gear ratio help"

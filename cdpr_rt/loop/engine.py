@@ -211,8 +211,8 @@ class Lifecycle:
     def reason(self) -> str:
         """Reason why the motion ended or was held, or the robot is not ready, as text, or ""."""
         first, *others = self.faults.values() or (None,)
-        told = [] if first is None else [first, *(f for f in others if f.code in IN_REASON)]
-        text = "; ".join(filter(None, (self.note, *map(self.text, told))))
+        named = [] if first is None else [first, *(f for f in others if f.code in IN_REASON)]
+        text = "; ".join(filter(None, (self.note, *map(self.text, named))))
         earlier = f" (before: {self.earlier[0]})" if self.earlier[0] else ""
         return (text + earlier)[:_MOST_CHARACTERS]
 

@@ -535,8 +535,8 @@ class CableControl(PlaceChecks):
 
     def notices(self) -> list[str]:
         """Return notices about wrong sensors and an oscillating loop, until `clear_notices`."""
-        told = (self._check.trouble, self._oscillation.trouble, self._tilt_trouble())
-        return [text for text in told if text]
+        troubles = (self._check.trouble, self._oscillation.trouble, self._tilt_trouble())
+        return [text for text in troubles if text]
 
     def _tilt_trouble(self) -> str:
         """Return why the inclinometer is of no use, "" if it is of use or missing."""

@@ -125,7 +125,7 @@ _TURNED_rad = 0.005
 """Rotation in each direction that a motor needs for a reliable result."""
 _SLID_rad = 3.0 * YIELD_rad
 """Rotation after which a motor's friction has almost completely reversed."""
-_TOLD = 0.7
+_CERTAIN = 0.7
 """The friction of other motors of the same kind is used if its standard deviation is below this
 share of the usual friction."""
 _MISFIT = 3.0
@@ -235,7 +235,7 @@ class PullFit:
         self.unknowns[:] = x
         self._covariance[:] = covariance * _wider(misfit)[:, None, None]
         turned = (self._turned >= _TURNED_rad).all(axis=0)
-        turned |= (self._turned >= _SLID_rad).any(axis=0) & (spread_Nm < _TOLD * usual_Nm)
+        turned |= (self._turned >= _SLID_rad).any(axis=0) & (spread_Nm < _CERTAIN * usual_Nm)
         self._found[:] = ~self._known & turned & (misfit < _MISFIT)
         angle_rad = self._motors[ORIGIN] + self.unknowns[:, ANGLE]
         return np.where(self._found, angle_rad, np.nan)
@@ -266,8 +266,8 @@ class PullFit:
         zero, usual_Nm = np.zeros(self._rated_Nm.size), FRICTION_SHARE * self._rated_Nm
         misfit, x, covariance = self._fit(sums, zero, usual_Nm)
         alone_Nm, variance = x[:, FRICTION], covariance[:, FRICTION, FRICTION]
-        told = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
-        return self._of_their_kind(told, alone_Nm, variance, usual_Nm)
+        own_weight = (~self._known & (misfit < _MISFIT)) / _wider(misfit)
+        return self._of_their_kind(own_weight, alone_Nm, variance, usual_Nm)
 
     def _slide(
         self, sums: FloatArray, friction_Nm: FloatArray, spread_Nm: FloatArray
@@ -289,21 +289,25 @@ class PullFit:
         certain = (slides.T * a) @ slides + np.eye(none.size) * _SLIDE_m**-2.0
         slide = np.asarray(np.linalg.solve(certain, slides.T @ b))
         misfit = self._fit(_moved_back(sums, slides @ slide), friction_Nm, spread_Nm)[0]
-        told = self._told()
-        noise = max(float((misfit**2 * told).sum() / told.sum()), 1.0)
+        own_weight = self._own_weight()
+        noise = max(float((misfit**2 * own_weight).sum() / own_weight.sum()), 1.0)
         significant = slide @ certain @ slide > noise * _SLIDES[none.size - 1]
         return slide if significant else none
 
     def _of_their_kind(
-        self, told: FloatArray, friction_Nm: FloatArray, variance: FloatArray, usual_Nm: FloatArray
+        self,
+        own_weight: FloatArray,
+        friction_Nm: FloatArray,
+        variance: FloatArray,
+        usual_Nm: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Return mean and standard deviation (n,) of friction of the other motors of each kind.
 
         It uses the friction found for each motor alone, with the prior 0 ± `usual_Nm`, and its
-        variance. `told` (n,), 0 to 1, is the weight of a motor's own data relative to the prior.
+        variance. `own_weight` (n,), 0 to 1, is the weight of a motor's own data against the prior.
         Without evidence from the others the result is 0 ± `usual_Nm` and a quarter of it.
         """
-        others = (self._of_a_kind & ~np.eye(told.size, dtype=np.bool_)) * told
+        others = (self._of_a_kind & ~np.eye(own_weight.size, dtype=np.bool_)) * own_weight
         precision = np.maximum(1.0 / variance - usual_Nm**-2.0, 0.0)
         weighted = friction_Nm / variance  # weighted by the precision of this motor's data
         mean_Nm = (others @ weighted) / (others @ precision + usual_Nm**-2.0)
@@ -331,7 +335,7 @@ class PullFit:
         covariance = np.asarray(np.linalg.inv(precision), float)
         x = (covariance @ known[:, :, None])[:, :, 0]
         left = sums[:, y, y] + (x * ((products @ x[:, :, None])[:, :, 0] - 2.0 * rest)).sum(axis=1)
-        misfit = np.maximum(left, 0.0) / self._told()
+        misfit = np.maximum(left, 0.0) / self._own_weight()
         # with softer cables all torques look larger
         x[:, FRICTION:] /= np.maximum(1.0 + x[:, [STEEPER]], _LEAST_STEEP)
         return np.sqrt(misfit), x, covariance
@@ -347,7 +351,7 @@ class PullFit:
         known[:, f] += friction_Nm / spread_Nm**2
         return precision, known
 
-    def _told(self) -> FloatArray:
+    def _own_weight(self) -> FloatArray:
         """Return the number of independent angles of each motor, (n,)."""
         return np.asarray(np.maximum(self._turned.sum(axis=0), _TURNED_rad) / self._alike_rad)
 

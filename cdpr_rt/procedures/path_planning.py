@@ -60,10 +60,12 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
             if factor < 1.0 and (factor * size <= room).all():
                 raise PathError(
                     path.source, line,
-                    f"the path is {_told(size)}, the workspace {_told(room)}; perhaps {text}",
+                    f"the path is {_text(size)}, the workspace {_text(room)}; perhaps {text}",
                 )  # fmt: skip
         raise PathError(
-            path.source, line, f"the path is {_told(size)}; allowed: {_told(room)}, the workspace"
+            path.source,
+            line,
+            f"the path is {_text(size)}; allowed: {_text(room)}, the workspace",
         )
 
 
@@ -74,12 +76,12 @@ def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> s
     if not size.any() or (size > _SMALL * room).any():
         return ""
     return (
-        f"the whole path is only {_told(size)}, in a workspace of {_told(room)}: are "
+        f"the whole path is only {_text(size)}, in a workspace of {_text(room)}: are "
         "its units right?"
     )
 
 
-def _told(size_m: FloatArray) -> str:
+def _text(size_m: FloatArray) -> str:
     return " x ".join(f"{1e3 * value:.4g}" for value in size_m) + " mm"
 
 

@@ -94,16 +94,16 @@ class PathProgram(PlatformProgram):
         """Return the path that can be resumed, or None."""
         if self._plan is None or self.store.unfinished is None:
             return None
-        return self._told(self._plan)
+        return self._as_status(self._plan)
 
     def progress(self) -> dict[str, Any]:
         """Return the platform's state and the progress along the path."""
         state = super().progress()
         if self._plan is not None:
-            state["path"] = self._told(self._plan)
+            state["path"] = self._as_status(self._plan)
         return state
 
-    def _told(self, plan: StoredPlan) -> dict[str, Any]:
+    def _as_status(self, plan: StoredPlan) -> dict[str, Any]:
         time_s = float(self._state[playback.TIME])
         row = plan.row(time_s)
         return {

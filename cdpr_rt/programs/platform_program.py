@@ -199,8 +199,8 @@ class PlatformParts:
         repair = f"{broken}: repair it, then `cdpr tighten --from home`" if broken else ""
         if self._shows_right_lengths():
             self.off_home = ""
-        told = (self.not_calibrated_reason, repair, *self.control.notices(), self.off_home)
-        return [text for text in told if text]
+        notices = (self.not_calibrated_reason, repair, *self.control.notices(), self.off_home)
+        return [text for text in notices if text]
 
     def _shows_right_lengths(self) -> bool:
         """Return whether the lengths agree so well that `off_home` must be wrong.

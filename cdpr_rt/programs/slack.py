@@ -353,9 +353,9 @@ class SlackTakeUp:
         turn while the others became tight may turn only when all are `pulled` harder.
         """
         slack_m = self._slack_m(position_rad)
-        told = pulled | (np.abs(slack_m) > _TURNED_m)
-        i = int(np.where(told, slack_m, -np.inf).argmax())
-        j = int(np.where(told, slack_m, np.inf).argmin())
+        clear = pulled | (np.abs(slack_m) > _TURNED_m)
+        i = int(np.where(clear, slack_m, -np.inf).argmax())
+        j = int(np.where(clear, slack_m, np.inf).argmin())
         more_m, allowed_m = slack_m[i] - slack_m[j], LOOSE_m
         if more_m <= allowed_m:
             return ""
@@ -400,7 +400,7 @@ class SlackTakeUp:
         i = int(off_m.argmax())
         if not off_m[i] > _MOVED_m:
             return "", ""
-        told = (
+        moved = (
             f"{self._names[i]}: tight {1e3 * abs(in_m[i]):.1f} mm further "
             f"{'in' if in_m[i] > 0.0 else 'out'} than it was alone, "
             f"{1e3 * (rubbed_m[i] + _MOVED_m):.1f} mm allowed"
@@ -410,10 +410,10 @@ class SlackTakeUp:
                 return "", ""  # the other cables would have shown a motion, so the winch was stuck
             return (
                 "",
-                f"{told}: its winch was stuck, or the platform may stand about this far from home",
+                f"{moved}: its winch was stuck, or the platform may stand about this far from home",
             )
         return (
-            f"{told}: a winch has dragged the platform on its stand; put it back at home, "
+            f"{moved}: a winch has dragged the platform on its stand; put it back at home, "
             f"and {_REMEDY}"
         ), ""
 

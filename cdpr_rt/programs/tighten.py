@@ -683,12 +683,12 @@ class TightenProgram(PlatformProgram):
 
     def _late(self) -> str:
         """Return as text which cables are not tight yet, and the pull on each."""
-        told, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
+        late, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
         if weak.any():
-            return f"{told}: {self._slack.pulls(weak)}"
+            return f"{late}: {self._slack.pulls(weak)}"
         i = int(self._stillness.moved_m.argmax())
         pull_N = self._winches.tension_N[i]
-        return f"{told}: {self._parts.names[i]} pulls with {pull_N:.1f} N and does not stand still"
+        return f"{late}: {self._parts.names[i]} pulls with {pull_N:.1f} N and does not stand still"
 
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble

@@ -118,7 +118,7 @@ class LoopLink:
         self._coalesced: dict[str, asyncio.Future[Reply]] = {}
         self._wake = asyncio.Event()
         self._loop = _ProcessWatch()
-        self._told = ("", "")
+        self._last_reported = ("", "")
         while block.take_reply() is not None:  # replies to a service that has ended
             pass
 
@@ -256,8 +256,8 @@ class LoopLink:
         status = self.status()
         state = self.state()
         reason = self.ended_how or str(status.get("reason", ""))
-        before = self._told
-        self._told = state, reason
+        before = self._last_reported
+        self._last_reported = state, reason
         if state != before[0]:
             self.events.add("state", state, program=status.get("program"))
         if reason and reason != before[1]:

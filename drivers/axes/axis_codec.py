@@ -237,7 +237,7 @@ def _follow_state(i: int, now: int, ints: Ints) -> None:
         if ints[MODE_DISPLAYED, i] != ints[MODE_REQUESTED, i]:
             ints[ALARM, i] |= WRONG_MODE
         return
-    left_by_itself = ints[WAS_ENABLED, i] and ints[TARGET, i] == _ENABLED
+    left_uncommanded = ints[WAS_ENABLED, i] and ints[TARGET, i] == _ENABLED
     ints[WAS_ENABLED, i] = 0
     if now in (_REACTION, _FAULT):
         if not ints[ACKNOWLEDGE, i]:
@@ -249,7 +249,7 @@ def _follow_state(i: int, now: int, ints: Ints) -> None:
         if ints[ACKNOWLEDGE, i]:
             ints[ACKNOWLEDGE, i] = 0
             ints[FAULTED, i] = 0
-        if left_by_itself:
+        if left_uncommanded:
             ints[TARGET, i] = _SWITCH_ON_DISABLED
             ints[ALARM, i] |= LEFT_ENABLED
 

@@ -190,7 +190,7 @@ _LSS_REQUESTS = {
     0x17: "store the configuration",
     **{0x40 + i: f"select by {name} {{number:08X}}h" for i, name in enumerate(_LSS_IDENTITY)},
     **{0x46 + i: f"who has {name} {{number:08X}}h?" for i, name in enumerate(_LSS_RANGES)},
-    0x4C: "who has no node id?",
+    0x4C: "asks for devices without a node id",
     0x51: "fast scan: {scan}",
     **{command: f"tell your {name}" for command, name in _LSS_INQUIRE.items()},
 }
@@ -213,7 +213,7 @@ def _lss_request(data: bytes) -> Reading:
         command=data[0],
         number=number,
         state="configuration" if data[1] else "waiting (normal operation)",
-        node_id="take the node id away" if data[1] == 0xFF else f"configure node id {data[1]}",
+        node_id="remove the node id" if data[1] == 0xFF else f"configure node id {data[1]}",
         rate=rate or f"number {data[2]} of table {data[1]}",
         delay=data[1] + 256 * data[2],
         scan="start again"
@@ -375,8 +375,8 @@ class Decoder:
             return Record(frame, "frame", None, f"29-bit identifier: {_hex(frame.data)}")
         node_id = frame.can_id & _NODE
         if frame.can_id & _FUNCTION == 0x700 and node_id:
-            return Record(frame, "heartbeat", node_id, "asked for (node guarding)")
-        return Record(frame, "frame", None, f"remote frame, {frame.length} bytes asked for")
+            return Record(frame, "heartbeat", node_id, "requested (node guarding)")
+        return Record(frame, "frame", None, f"remote frame, {frame.length} bytes requested")
 
     def _heartbeat(self, frame: Frame, node_id: int) -> Record:
         if frame.data[:1] == b"\0":

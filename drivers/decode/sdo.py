@@ -209,7 +209,7 @@ class SdoDecoder:
     def _acknowledged(self, data: bytes, sender: str) -> SdoEvent:
         transfer = self._transfer
         if transfer is None:
-            return SdoEvent(Step.CONTROL, note=f"segments up to {data[1]} taken")
+            return SdoEvent(Step.CONTROL, note=f"segments up to {data[1]} acknowledged")
         missed = len(transfer.block) > data[1]
         transfer.data += b"".join(transfer.block[: data[1]])
         transfer.block.clear()
@@ -217,7 +217,7 @@ class SdoDecoder:
         # after the last segment the next frame is a command again
         self._streams = "" if transfer.last and not missed else sender
         again = ", the others again" if missed else ""
-        return self._event(Step.CONTROL, note=f"segments up to {data[1]} taken{again}")
+        return self._event(Step.CONTROL, note=f"segments up to {data[1]} acknowledged{again}")
 
     def _drop_padding(self, data: bytes) -> None:
         """Drop the padding of the last segment; the end of a block transfer gives its length."""
@@ -259,7 +259,7 @@ class SdoDecoder:
         if what == 2:
             return self._acknowledged(data, "server")
         self._end()
-        return self._event(Step.CONTROL, note="end of block transfer taken")
+        return self._event(Step.CONTROL, note="end of block transfer acknowledged")
 
     def _block_upload_answer(self, data: bytes) -> SdoEvent:
         if data[0] & 1:

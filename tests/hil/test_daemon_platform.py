@@ -18,7 +18,7 @@ import cdpr_profiles
 from cdpr_profiles import load_robot
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import load_data
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.model.calibration_state import mark_not_calibrated
 
 PERIOD_S = 0.004
@@ -181,7 +181,7 @@ def test_poses_are_recorded_for_a_calibration(turning: RealDaemon, tmp_path: Pat
     geometry = CableGeometry.of(load_robot(str(turning.robot)))
     there = geometry.model.poses(np.array([[0.15, 1.5, math.radians(4.0)]]))
     tension_N = np.array([data.poses[1].tension_N])
-    lengths_m = lengths_told(geometry, there, tension_N)[0]
+    lengths_m = encoder_lengths(geometry, there, tension_N)[0]
     assert data.poses[1].length_m == pytest.approx(lengths_m.tolist(), abs=0.005)
     output_of(turning, "lower")
 

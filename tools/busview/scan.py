@@ -363,7 +363,7 @@ def _row(node: dict[str, Any]) -> tuple[str, ...]:
     modes = node["supported_modes"]
     return (
         str(node["node_id"]),
-        node["nmt_state"] or "not told",
+        node["nmt_state"] or "unknown",
         node["device_name"] or "-",
         ", ".join(node["profiles"]) or "-",
         node["state"] or "-",

@@ -194,7 +194,7 @@ def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
         return "--dry-run"
     if not outcome.good:
         return "it is not good"
-    if outcome.adopt or outcome.told_from_file:
+    if outcome.adopt or outcome.differs_from_file:
         return None
     if outcome.worse:
         return (

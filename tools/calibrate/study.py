@@ -187,12 +187,12 @@ def simulated_errors(
     lengths, positions, turns = _of(unit, noise)
     Q = poses[:, 1:] @ Rotation.from_rotvec(turns).as_matrix()
     points = (poses[:, 0] + positions)[:, None] + np.einsum("jab,ib->jia", Q, anchors_m)
-    told = rho - rho[0] + lengths
+    measured = rho - rho[0] + lengths
     true = np.concatenate([exits_m, rho[0][:, None]], axis=1)
     v = true
     for _ in range(_STEPS):
         c = np.swapaxes(points - v[:, :3], 0, 1)
-        away = told.T + v[:, 3:]
+        away = measured.T + v[:, 3:]
         u = (c**2).sum(axis=2) - away**2
         H = -2.0 * np.concatenate([c, away[..., None]], axis=2)
         gradient = np.swapaxes(H, 1, 2) @ u[..., None]

@@ -63,10 +63,10 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
             if status["state"] != DEAD and _may_run(socket, error):
                 time.sleep(_WATCH_S)
                 continue
-            told = "; ".join(filter(None, (after_stop_text(ended), dies)))
+            ended_text = "; ".join(filter(None, (after_stop_text(ended), dies)))
             if had_died or dies or unheard_axes(ended):
-                raise WorkFailedError(told) from None
-            out.say(told)
+                raise WorkFailedError(ended_text) from None
+            out.say(ended_text)
             return
         if has_died(status) and not had_died and not dies:
             # if drives do not confirm, the loop ends with an error, and the service stays to report

@@ -533,6 +533,6 @@ class _DaemonProcess:
 
     def _last_error(self) -> str:
         self._errors.seek(0)
-        told = self._errors.read().decode(errors="replace").strip().splitlines()
-        causes = [line.removeprefix("cdpr: ") for line in told if "could not begin" not in line]
-        return (causes or told or ["the daemon ended"])[-1]
+        lines = self._errors.read().decode(errors="replace").strip().splitlines()
+        causes = [line.removeprefix("cdpr: ") for line in lines if "could not begin" not in line]
+        return (causes or lines or ["the daemon ended"])[-1]

@@ -301,7 +301,7 @@ def _figures(budget: BusBudget) -> dict[str, Any]:
         "highest_rate_Hz": math.floor(budget.highest_rate_Hz * 100) / 100,
         "sdo_transfers_per_s": round(budget.sdo_transfers_s, 1),
         "changes_us": round(budget.changes_s * _US, 3),
-        "changes_told_after_cycles": budget.recovery_cycles,
+        "changes_seen_after_cycles": budget.recovery_cycles,
         "longest_wait_of_sync_us": round(budget.longest_wait_s * _US, 3),
         "fits": budget.fits,
     }

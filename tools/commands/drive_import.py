@@ -282,12 +282,12 @@ _TOPICS = {
 }
 _ASSUMPTIONS = {
     "torque_unit": ("per_mille_of_rated", "as CiA 402-2 defines it for 6071h"),
-    "rated_torque_unit": ("mNm", "as CiA 402-2 has it; the boot compares 6076h with the motor"),
-    "velocity_unit": ("counts_per_s", "as CiA 402-2 has it without scaling"),
-    "acceleration_unit": ("counts_per_s2", "as CiA 402-2 has it without scaling"),
-    "position_sign": (1, "no EDS tells it"),
-    "torque_sign": (1, "no EDS tells it"),
-    "homing_sign": (1, "no EDS tells it"),
+    "rated_torque_unit": ("mNm", "as CiA 402-2 defines it; the boot compares 6076h with the motor"),
+    "velocity_unit": ("counts_per_s", "as CiA 402-2 defines it without scaling"),
+    "acceleration_unit": ("counts_per_s2", "as CiA 402-2 defines it without scaling"),
+    "position_sign": (1, "no EDS states it"),
+    "torque_sign": (1, "no EDS states it"),
+    "homing_sign": (1, "no EDS states it"),
     "mode_display_timeout_s": (0.5, "generous"),
     "state_timeout_s": (1.0, "generous"),
     "feedback_delay_s": (0.0005, "usual for a drive that samples at 2 kHz"),

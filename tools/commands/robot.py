@@ -355,7 +355,7 @@ def _key_and_value(text: str) -> tuple[str, str]:
 
 def _say_findings(out: Output, found: list[Finding]) -> None:
     for finding in found:
-        kind = "impossible" if finding.impossible else "mind"
+        kind = "impossible" if finding.impossible else "warning"
         out.say(f"{kind}: {finding.key}: {finding.text}")
 
 

@@ -81,7 +81,7 @@ class BoundedLog(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return whether the line is among the first of its kind."""
-        if getattr(record, "told_by_bounded_log", False):
+        if getattr(record, "from_bounded_log", False):
             return True
         key = (record.name, str(record.msg))
         with self._lock:
@@ -102,7 +102,7 @@ class BoundedLog(logging.Filter):
         for kind in kinds:
             if kind.more:
                 text = f"{kind.more} more within {_WINDOW_S:g} s: {kind.text or 'of other kinds'}"
-                extra = {"told_by_bounded_log": True}
+                extra = {"from_bounded_log": True}
                 logging.getLogger(kind.logger).log(kind.level, "%s", text, extra=extra)
 
     async def watch(self) -> None:

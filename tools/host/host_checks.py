@@ -235,7 +235,7 @@ def _timers() -> HostFinding:
 def _clock_source() -> HostFinding:
     used = _text(_CLOCKS / "current_clocksource")
     if not used or used in _GOOD_CLOCKS:
-        return HostFinding("clock source", "ok", used or "not told")
+        return HostFinding("clock source", "ok", used or "unknown")
     found = f"{used}: reading the clock is slow"
     available = _text(_CLOCKS / "available_clocksource").split()
     better = next((clock for clock in available if clock in _GOOD_CLOCKS), "")

@@ -174,8 +174,8 @@ def read_poses(table: Table, columns: PoseColumns) -> Poses:
     rotation = None
     if turns is not None:
         by_quaternion = columns.rotation_vector is None
-        basis, told = Rotation.from_matrix(to_room), turns[seen]
-        of_body = Rotation.from_quat(told) if by_quaternion else Rotation.from_rotvec(told)
+        basis, measured = Rotation.from_matrix(to_room), turns[seen]
+        of_body = Rotation.from_quat(measured) if by_quaternion else Rotation.from_rotvec(measured)
         rotation = basis * of_body * basis.inv()
     return Poses(time[seen], position[seen] @ to_room.T + columns.offset_m, rotation)
 
@@ -221,15 +221,15 @@ def _require_same_clock(
     exits = np.array(model.platform.exit_points_m)
     k = exits.shape[1]
     apart = np.linalg.norm(exits[None] - poses.position_m[:, None, :k], axis=2)
-    told, first = (_rates(*one) for one in ((time, lengths), (poses.time_s, apart)))
-    products = sum(correlate(a, b) for a, b in zip(told[0], first[0], strict=True))
-    both = [np.ones_like(told[0][0]), np.ones_like(first[0][0])]
-    of_told = correlate((told[0] ** 2).sum(axis=0), both[1])
-    of_poses = correlate(both[0], (first[0] ** 2).sum(axis=0))
-    enough = (of_told > 0.3 * of_told.max()) & (of_poses > 0.3 * of_poses.max())
-    alike = np.where(enough, products / np.sqrt(np.maximum(of_told * of_poses, 1e-12)), 0.0)
-    later_s = _CLOCK_STEP_S * correlation_lags(told[0].shape[1], first[0].shape[1])
-    later_s += told[1] - first[1]
+    of_cables, first = (_rates(*one) for one in ((time, lengths), (poses.time_s, apart)))
+    products = sum(correlate(a, b) for a, b in zip(of_cables[0], first[0], strict=True))
+    both = [np.ones_like(of_cables[0][0]), np.ones_like(first[0][0])]
+    cable_power = correlate((of_cables[0] ** 2).sum(axis=0), both[1])
+    pose_power = correlate(both[0], (first[0] ** 2).sum(axis=0))
+    enough = (cable_power > 0.3 * cable_power.max()) & (pose_power > 0.3 * pose_power.max())
+    alike = np.where(enough, products / np.sqrt(np.maximum(cable_power * pose_power, 1e-12)), 0.0)
+    later_s = _CLOCK_STEP_S * correlation_lags(of_cables[0].shape[1], first[0].shape[1])
+    later_s += of_cables[1] - first[1]
     now, best = int(np.abs(later_s).argmin()), int(alike.argmax())
     if alike[best] > _ALIKE and alike[best] - alike[now] > _BETTER:
         raise BadInputError(

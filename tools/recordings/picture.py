@@ -236,11 +236,11 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
     first_ns, last_ns = columns["stamp_ns"][0], columns["stamp_ns"][-1]
     shown = [one for one in stamped if first_ns <= one[0] <= last_ns and is_fault(one[1])]
     reactions = [at_ns for at_ns, event in shown if event["reaction"] > Reaction.CLAMP]
-    found, reasons, told_ns = list[tuple[float, str]](), Reasons(stamped), -1
+    found, reasons, shown_ns = list[tuple[float, str]](), Reasons(stamped), -1
     for at_ns, event in shown:
         later = [other_ns for other_ns in reactions if other_ns > at_ns + _SEEN_ns]
         seen_ns, reason = reasons.stamped_after(at_ns, min(later, default=math.inf))
-        reason, told_ns = "" if seen_ns == told_ns else reason, max(seen_ns, told_ns)
+        reason, shown_ns = "" if seen_ns == shown_ns else reason, max(seen_ns, shown_ns)
         after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
         # the reason already begins with the axis of the limit
         text = str(event["text"]).removesuffix(f" of {reason.partition(':')[0]}")

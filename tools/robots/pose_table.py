@@ -150,11 +150,11 @@ def errors(poses: FloatArray, table: PoseTable) -> dict[str, dict[str, float]]:
         off = poses[known, :3] - table.position_m[known]
         found["position, mm"] = 1e3 * np.linalg.norm(off, axis=1)
     if table.quaternion is not None:
-        told, true = (
+        computed, true = (
             Rotation.from_quat(np.roll(q[known], -1, axis=1))
             for q in (poses[:, 3:], table.quaternion)
         )
-        turn = (told * true.inv()).as_rotvec(degrees=True)
+        turn = (computed * true.inv()).as_rotvec(degrees=True)
         found["tilt, deg"] = np.linalg.norm(turn[:, :2], axis=1)
         found["about z, deg"] = np.abs(turn[:, 2])
     return {

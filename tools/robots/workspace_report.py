@@ -68,15 +68,15 @@ def lines(robot: Robot, settings: Search, found: dict[str, Any]) -> list[str]:
     ]
     if unseen:
         text.append(
-            f"mind       the rays see only a part: to {100.0 * unseen:.1f} % of the grid's places "
+            f"warning    the rays see only a part: to {100.0 * unseen:.1f} % of the grid's places "
             "inside no straight line from their centre leads; go by the grid"
         )
     elif abs(off) > _AGREE:
-        text.append("mind       grid and rays differ: take more --cells and --rays")
+        text.append("warning    grid and rays differ: take more --cells and --rays")
     if found["reaches_sides"]:
         sides = ", ".join(found["reaches_sides"])
         text.append(
-            f"mind       it reaches the sides of the searched box ({sides}) and may extend "
+            f"warning    it reaches the sides of the searched box ({sides}) and may extend "
             "beyond them: use --low, --high"
         )
     return text

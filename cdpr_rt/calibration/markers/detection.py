@@ -446,7 +446,9 @@ def _why_none(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board) -> 
     read = max((one.corners_px for one in sights), key=len, default={})
     mirrored = max((one.mirrored for one in sights), key=len, default=())
     if len(mirrored) > len(read):
-        return [f"{len(mirrored)} markers read as mirror images: is the board, or the image, so?"]
+        return [
+            f"{len(mirrored)} markers read as mirror images: is the board or the image mirrored?"
+        ]
     if len(read) >= _LEAST_CORNERS // 2:
         return [
             f"{len(read)} markers of {board.dictionary} are read, but no board of {board.columns} "

@@ -470,8 +470,10 @@ class _Layout:
         """Return which markers agree if two of them determine frame and scale, (m,)."""
         places, turns = self.places[order], self.turns[order]
         middles = self.map_m.mean(axis=1)
-        told_m, seen_m = (float(np.linalg.norm(p[pair[0]] - p[pair[1]])) for p in (places, middles))
-        scale = told_m / max(seen_m, 1e-9)
+        given_m, seen_m = (
+            float(np.linalg.norm(p[pair[0]] - p[pair[1]])) for p in (places, middles)
+        )
+        scale = given_m / max(seen_m, 1e-9)
         if not _SCALES[0] < scale < _SCALES[1]:
             return np.zeros(len(order), bool)
         own = scale * self.flat_m[pair] @ turns[pair].transpose(0, 2, 1) + places[pair][:, None]

@@ -66,7 +66,7 @@ class Store {
 
   #keep(cycle: Cycle): void {
     const { recent } = this;
-    if (recent.length && cycle.time_s < recent[recent.length - 1]!.time_s) recent.length = 0; // the loop has started anew
+    if (recent.length && cycle.time_s < recent[recent.length - 1]!.time_s) recent.length = 0; // the loop has restarted
     recent.push(cycle);
     while (recent[0]!.time_s < cycle.time_s - KEPT_S) recent.shift();
     this.cycles.forEach((listener) => listener(cycle));

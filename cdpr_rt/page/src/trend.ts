@@ -53,7 +53,7 @@ export class Trend {
 
   add(time_s: number, values: (number | null)[]): void {
     const times = this.#data[0]!;
-    if (times.length && time_s < times[times.length - 1]!) this.#data.forEach((one) => one.splice(0)); // the loop has started anew
+    if (times.length && time_s < times[times.length - 1]!) this.#data.forEach((one) => one.splice(0)); // the loop has restarted
     times.push(time_s);
     values.forEach((value, number) => this.#data[number + 1]?.push(value));
     if (times.length > POINTS) this.#data.forEach((one) => one.shift());

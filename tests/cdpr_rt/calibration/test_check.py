@@ -14,7 +14,7 @@ from cdpr_profiles.places import SHIPPED
 from cdpr_rt.calibration.check import Check, check_geometry, require_spare_length
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import Observations
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.made_up import made_up
 
@@ -37,11 +37,11 @@ def checked(
     poses = np.array([pose.array for pose in what.poses])
     poses[0, 0, :k] += home_m[:k]
     tension = what.seen.tension_N
-    true = lengths_told(replace(what.file, cable=changed), poses, tension)
+    true = encoder_lengths(replace(what.file, cable=changed), poses, tension)
     rng = np.random.default_rng(4)
     # encoders start at the assumed lengths of home
     paid_out = (true - true[0]) / (1.0 + changed[:, 4]) + rng.normal(0.0, 1.5e-4, true.shape)
-    told = lengths_told(what.file, what.seen.start[:1], tension[:1])[0] + paid_out
+    told = encoder_lengths(what.file, what.seen.start[:1], tension[:1])[0] + paid_out
     told[slip_from:, cable] -= slip_m
     seen = Observations.of_lengths(told, tension, what.seen.start)
     if scanner_m is not None:

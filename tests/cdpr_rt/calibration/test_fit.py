@@ -14,7 +14,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.calibration.fit import fit, locate, moved
 from cdpr_rt.calibration.parameters import KINDS, CableGeometry, Knowledge
 from cdpr_rt.calibration.readings import Observations
-from cdpr_rt.calibration.residuals import lengths_told, linearise
+from cdpr_rt.calibration.residuals import encoder_lengths, linearise
 from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.made_up import made_up, measured
 from tests.heavy_cables import cables_on
@@ -178,5 +178,5 @@ def test_lengths_of_heavy_cables_correspond_to_tensions_at_the_winches() -> None
     for place_m in ((0.0, 0.0, 0.75), (2.0, -1.0, 2.0)):
         poses = np.vstack([place_m, np.eye(3)])[None]
         true_m, _ = cables_on(platform, place_m, [cable.stiffness_N] * len(axes), winch_N)
-        told_m = lengths_told(geometry, poses, winch_N[None])[0]
+        told_m = encoder_lengths(geometry, poses, winch_N[None])[0]
         np.testing.assert_allclose(told_m, true_m, atol=1e-5)

@@ -49,12 +49,12 @@ def test_a_rigidly_moved_fit_is_returned_to_the_frame_of_the_file(robot: str) ->
 def test_a_camera_keeps_the_frame_of_a_right_file_and_detects_a_wrong_one() -> None:
     right = camera_robot(25, 3, RIGHT, hand_eye_known=False, knowledge=TAPE)
     kept = calibrate(right.robot, right.geometry, right.seen, "camera", right.images)
-    assert not kept.told_from_file, kept.verdict()
+    assert not kept.differs_from_file, kept.verdict()
     assert np.linalg.norm(kept.shift_m) < 0.5e-3
     assert kept.absolute.position_mm > 10.0 > kept.predicted_3_sigma_mm
     wrong = camera_robot(25, 3, WRONG_EXITS, hand_eye_known=False, knowledge=TAPE)
     told = calibrate(wrong.robot, wrong.geometry, wrong.seen, "camera", wrong.images)
-    assert told.told_from_file, told.verdict()
+    assert told.differs_from_file, told.verdict()
 
 
 @pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
@@ -64,7 +64,7 @@ def test_points_keep_a_right_file_and_correct_a_wrong_one(robot: str) -> None:
         what = made_up(robot, 45, 6, noise_m=2e-4, home_first=True, **errors)  # type: ignore[arg-type]
         seen = measured(what, 1e-3, 2e-3, 8)
         outcome = calibrate(load_robot(robot), what.file, seen, "points")
-        assert outcome.good and outcome.told_from_file == told, outcome.verdict()
+        assert outcome.good and outcome.differs_from_file == told, outcome.verdict()
         assert outcome.absolute.position_mm > outcome.predicted_3_sigma_mm
 
 

@@ -198,7 +198,7 @@ def test_mistakes_on_a_robot_in_space_are_reported_and_never_make_a_calibration_
         one = PointSet.of("spatial-8", 8, 10)
         outcome, named = _judged(one, slip)
         missed += [] if named else [(slip, [fault.text for fault in outcome.faults])]
-        if outcome.good and outcome.told_from_file:
+        if outcome.good and outcome.differs_from_file:
             assert one.error_mm(outcome.found.geometry) < one.error_mm(one.what.file)
     assert len(missed) <= 0.1 * len(SLIPS), missed
 
@@ -213,7 +213,7 @@ def test_healthy_points_are_not_suspected(robots: dict[str, str], name: str) -> 
             outcome = one.spoiled(_none)
             if outcome.faults:
                 suspected.append([fault.text for fault in outcome.faults])
-            if outcome.good and outcome.told_from_file:
+            if outcome.good and outcome.differs_from_file:
                 before, after = one.error_mm(one.what.file), one.error_mm(outcome.found.geometry)
                 errors.append((before, after, outcome.predicted_3_sigma_mm))
     before, after, predicted = np.mean(errors, axis=0)

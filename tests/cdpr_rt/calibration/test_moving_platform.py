@@ -56,7 +56,7 @@ def test_noise_and_time_offset_are_estimated_without_inventing_faults(
     assert noise.offset_s == pytest.approx(0.02, abs=max(0.001, 3.0 * noise.offset_std_s))
     assert noise.offset_std_s < 0.001
     assert noise.geometry.knowledge.alike > 1.5
-    assert outcome.good and outcome.told_from_file
+    assert outcome.good and outcome.differs_from_file
     file_mm = outcome.before.mean_mm
     for share, objections in ((2.9, 0), (3.1, 1)):  # 3 sigma is no worse than with the file
         predicted = replace(outcome.predicted, position_mm=share * file_mm)

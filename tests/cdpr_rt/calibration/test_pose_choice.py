@@ -24,7 +24,7 @@ from cdpr_rt.calibration.pose_choice import (
     predicted_deviation_m,
     spread,
 )
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.model.cable_kernel import RADIUS
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.reachable import Reach
@@ -81,7 +81,7 @@ def test_information_rows_of_a_pose_equal_its_marginal_information() -> None:
             x: np.ndarray, pose: np.ndarray = pose, tension: np.ndarray = tension
         ) -> np.ndarray:
             there = moved(pose[None], x[None, size + 6 :], (0, 1, 2, 3, 4, 5))
-            lengths = lengths_told(geometry.with_values(x[:size]), there, tension)[0]
+            lengths = encoder_lengths(geometry.with_values(x[:size]), there, tension)[0]
             Q = there[0, 1:]
             camera = np.concatenate([
                 (there[0, 0] + Q @ x[size : size + 3]) / POSITION_m,

@@ -171,12 +171,12 @@ def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
         outcome = calibrate(load_robot(robot), right.file, measured(right, 1e-3, 2e-3, 8), "points")
         assert outcome.good, outcome.objections()
         chances.append(outcome.change.chance)
-        if not outcome.told_from_file:
+        if not outcome.differs_from_file:
             assert "may already be right" in "\n".join(outcome.verdict())
     assert min(chances) > 0.001 and np.mean(chances) > 0.1  # 0.5 on average
     wrong = made_up(robot, 45, 1, exit_m=0.003, drum=0.001, offset_m=0.0, noise_m=3e-4)
     outcome = calibrate(load_robot(robot), wrong.file, measured(wrong, 1e-3, 2e-3, 8), "points")
-    assert outcome.told_from_file and outcome.insignificance() is None
+    assert outcome.differs_from_file and outcome.insignificance() is None
 
 
 def test_a_calibration_that_predicts_held_out_poses_worse_is_not_adopted_on_request() -> None:
@@ -188,7 +188,7 @@ def test_a_calibration_that_predicts_held_out_poses_worse_is_not_adopted_on_requ
         load_robot("planar-3"), right.file, measured(right, 1e-3, 2e-3, 8), "points"
     )
     asked = replace(outcome, adopt=True)
-    assert not outcome.told_from_file and outcome.good
+    assert not outcome.differs_from_file and outcome.good
     before = outcome.before.errors_m
     other_way = 1.05 * before[::-1]  # the mean is larger, but errors are not larger at most poses
     gross = before.copy()

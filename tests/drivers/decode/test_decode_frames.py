@@ -311,7 +311,7 @@ def test_frames_outside_canopen_are_shown_raw() -> None:
     decoder = Decoder()
     extended = decoder.decode(Frame(0.0, 0x181, b"\1", extended=True))
     assert (extended.kind, extended.node_id) == ("frame", None)
-    assert decoder.decode(Frame(0.0, 0x701, b"", remote=True)).text == "asked for (node guarding)"
+    assert decoder.decode(Frame(0.0, 0x701, b"", remote=True)).text == "requested (node guarding)"
     assert decoder.decode(Frame(0.0, 0x7FF, b"\1")).text == "no CANopen identifier: 01"
 
 

@@ -18,7 +18,7 @@ from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.markers.marker_map import Sighting
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, load_data
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.measure_poses import (
     SETTLE_S,
@@ -89,7 +89,7 @@ class Rig:
     def read(self, seconds: float) -> Readings:
         tension = np.full(self.geometry.n, TENSION)
         pose = self.geometry.model.poses(self.here[None])
-        lengths = lengths_told(self.geometry, pose, tension[None])[0] + self.offset
+        lengths = encoder_lengths(self.geometry, pose, tension[None])[0] + self.offset
         lengths += self._chance.normal(0.0, 1e-4, lengths.shape)
         return Readings(np.tile(lengths, (20, 1)), np.tile(tension, (20, 1)), pose[0, 0], 1e-3)
 

@@ -15,7 +15,7 @@ from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import load_data
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import TripError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.calibrate import daemon_run
@@ -258,7 +258,7 @@ class Calibrated(Moved):
 
     def lengths_m(self, place: FloatArray) -> FloatArray:
         poses = self.geometry.model.poses(place[None])
-        return np.asarray(lengths_told(self.geometry, poses, self.tension_N)[0])
+        return np.asarray(encoder_lengths(self.geometry, poses, self.tension_N)[0])
 
     def get(self, path: str) -> dict[str, Any]:
         status = super().get(path)

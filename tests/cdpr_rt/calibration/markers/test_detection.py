@@ -127,7 +127,7 @@ def test_intrinsics_from_a_board_are_true_within_their_uncertainty() -> None:
             False,
             "columns and 9 rows has this arrangement: were columns and rows exchanged",
         ),
-        (Board(), True, "markers read as mirror images: is the board, or the image, so"),
+        (Board(), True, "markers read as mirror images: is the board or the image mirrored"),
     ],
 )
 def test_a_board_that_differs_from_its_description_is_reported(
