@@ -154,7 +154,7 @@ class PathFile(ClientRequest):
         float, Field(ge=0, le=1000, description="Tolerance for cutting corners of G-code.")
     ] = 1.0
     ignore: Annotated[
-        str, Field(pattern=r"^[A-Za-z0-9. ]{0,64}$", description="Words of G-code to ignore.")
+        str, Field(pattern=r"^[A-Za-z0-9._ ]{0,256}$", description="Words of G-code to ignore.")
     ] = ""
     z_mm: Annotated[float | None, Field(ge=-1e6, le=1e6, description="Z of G-code without Z.")] = (
         None

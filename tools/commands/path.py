@@ -90,7 +90,7 @@ def _with_path(
         str,
         typer.Option(
             metavar="'U M777 ...'",
-            help="G-code letters to drop, and M codes whose lines are skipped.",
+            help="G-code letters to drop, and M codes and macros whose lines are skipped.",
         ),
     ] = "",
     z: Annotated[

@@ -6,7 +6,7 @@ Supported are the codes of RS274/NGC that have a meaning for a platform without 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +19,13 @@ from cdpr_rt.motion.path.description import (
     Move,
     PathDescription,
 )
-from cdpr_rt.motion.path.gcode_words import Block, Findings, blocks, require_ignorable
+from cdpr_rt.motion.path.gcode_words import (
+    NEVER_IGNORED,
+    Block,
+    Findings,
+    blocks,
+    require_ignorable,
+)
 
 # Arcs between two points of a plane, by their centre or their radius.
 
@@ -90,15 +96,17 @@ def _turn(first: FloatArray, last: FloatArray) -> float:
 INCH_m: Final = 0.0254
 _MM_m: Final = 1e-3
 _MOTIONS: Final = ("G0", "G1", "G2", "G3")
-_CYCLES: Final = ("G81", "G82", "G83")
+_CYCLES: Final = ("G73", "G81", "G82", "G83")
 _SYSTEMS: Final = ("G54", "G55", "G56", "G57", "G58", "G59")
 _OFFSETS: Final = ("G92", "G92.1", "G92.2", "G92.3")
+_PRINTING: Final = ("G10", "G11", "G29")
+"""Retraction, its end, and levelling of a printer's bed; G10 L sets data of a machine."""
 _PLANES: Final = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 _GROUPS: Final = (
-    (*_MOTIONS, *_CYCLES, "G80"), ("G4", "G10", "G28", *_OFFSETS), tuple(_PLANES), ("G20", "G21"),
-    ("G40",), ("G49",), _SYSTEMS, ("G53",), ("G61", "G61.1", "G64"), ("G90", "G91"),
-    ("G90.1", "G91.1"), ("G93", "G94"), ("G98", "G99"), ("M0", "M2", "M30"), ("G15",), ("G69",),
-    ("G97",),
+    (*_MOTIONS, *_CYCLES, "G80"), ("G4", *_PRINTING, "G28", *_OFFSETS), tuple(_PLANES),
+    ("G20", "G21", "G70", "G71"), ("G40",), ("G49",), _SYSTEMS, ("G53",),
+    ("G61", "G61.1", "G64"), ("G90", "G91"), ("G90.1", "G91.1"), ("G93", "G94"),
+    ("G98", "G99"), ("M0", "M2", "M30"), ("G15",), ("G69",), ("G97",),
 )  # fmt: skip
 """Supported codes; a line may have one of each group."""
 _KNOWN: Final = frozenset(code for group in _GROUPS for code in group)
@@ -108,6 +116,7 @@ _LETTERS: Final = {
 _MODES: Final[dict[str, tuple[str, Any]]] = {
     "G17": ("plane", "G17"), "G18": ("plane", "G18"), "G19": ("plane", "G19"),
     "G20": ("unit_m", INCH_m), "G21": ("unit_m", _MM_m),
+    "G70": ("unit_m", INCH_m), "G71": ("unit_m", _MM_m),
     "G90": ("relative", False), "G91": ("relative", True),
     "G90.1": ("relative_centres", False), "G91.1": ("relative_centres", True),
     "G93": ("inverse_time", True), "G94": ("inverse_time", False),
@@ -120,7 +129,7 @@ _CENTRES: Final = "IJK"
 _WHY: Final = {
     "G41": "tool radius compensation is not supported: have the CAM program compensate",
     "G42": "tool radius compensation is not supported: have the CAM program compensate",
-    "M98": "subprograms are not supported",
+    **dict.fromkeys(("M97", "M98", "M99"), "subprograms are not supported"),
 }
 _LONG_DWELL_s: Final = 10.0
 _CLOSE_m: Final = 0.254e-3
@@ -255,6 +264,9 @@ class _Reader:
     def _execute(self, block: Block) -> None:
         """Execute one line, in the order that RS274 defines."""
         codes, words, state = block.codes, dict(block.words), self._state
+        if set(codes) & set(_MOTIONS):  # G80 ends a cycle, as the motion does
+            codes = tuple(code for code in codes if code != "G80")
+            block = replace(block, codes=codes)
         is_known = self._refuse_unknown(block, words)
         self._set_modes(codes, words)
         if not is_known:
@@ -264,8 +276,8 @@ class _Reader:
             self._dwell(block, words)
         if code := next((one for one in codes if one in _OFFSETS), None):
             self._offset(code, words)
-        elif "G10" in codes:
-            self._data(block, words)
+        elif code := next((one for one in codes if one in _PRINTING), None):
+            self._data(block, code, words)
         elif "G28" in codes:
             self._to_reference(block, words)
         motion = next((one for one in codes if one in _GROUPS[0]), state.motion)
@@ -276,7 +288,9 @@ class _Reader:
         if _AXES & set(words) or set(_CENTRES) & set(words) or "R" in words:
             self._move(block, words, in_room="G53" in codes)
         if words:
-            raise _LineError(f"{next(iter(words))}: has no meaning with {motion}")
+            letter = next(iter(words))
+            advice = "; remove it, or give G2 or G3" if letter in _CENTRES else ""
+            raise _LineError(f"{letter}: has no meaning with {motion}{advice}")
         if "M0" in codes:
             self._stop(Move(block.line, self._room(state.here), math.inf, waits=True))
 
@@ -287,7 +301,7 @@ class _Reader:
         unknown = [code for code in block.codes if code not in _KNOWN]
         for code in unknown:
             problem = _WHY.get(code) or "is not supported"
-            if code[0] == "M" and code not in _WHY:
+            if code[0] == "M" and code not in NEVER_IGNORED:
                 problem += (
                     f"; if it neither moves nor changes later lines, --ignore {code} skips its line"
                 )
@@ -404,12 +418,14 @@ class _Reader:
         state.kept_offset[:] = state.offset
         self._begin(self._last)
 
-    def _data(self, block: Block, words: dict[str, float]) -> None:
-        """Skip G10, unless it moves the zero of a path that has begun."""
+    def _data(self, block: Block, code: str, words: dict[str, float]) -> None:
+        """Skip a code for printers or data, unless it moves the zero of a path that has begun."""
         if words.get("L") in (2.0, 20.0) and self._path is not None:
-            raise _LineError("G10: moves the zero within the path; allowed: G92")
+            raise _LineError(f"{code}: moves the zero within the path; allowed: G92")
+        if code != "G10" and _AXES & set(words):
+            raise _LineError(f"{code}: allowed only for printers, without axes")
         words.clear()
-        self._findings.ignore(block.line, "the line of G10")
+        self._findings.ignore(block.line, f"the line of {code}")
 
     # -- motion
 
@@ -514,13 +530,13 @@ class _Reader:
         repeats = words.pop("L", 1.0)
         if not (repeats.is_integer() and 1.0 <= repeats <= _MOST_REPEATS):
             raise _LineError(f"L{repeats:g}: allowed: 1 to {_MOST_REPEATS}")
-        needed = "ZR" + {"G82": "P", "G83": "Q"}.get(motion, "")
+        needed = "ZR" + {"G73": "Q", "G82": "P", "G83": "Q"}.get(motion, "")
         if lacking := [letter for letter in needed if letter not in state.drilling]:
             raise _LineError(f"{motion}: {lacking[0]} is missing")
         given, level = state.drilling, state.level_m
         above = given["R"] + (level if state.relative else state.offset[2])
         bottom = given["Z"] + (above if state.relative else state.offset[2])
-        peck_m = given.get("Q", math.inf) if motion == "G83" else math.inf
+        peck_m = given["Q"] if "Q" in needed else math.inf
         if not (bottom <= above and peck_m >= _LEAST_PECK_m):
             least = _LEAST_PECK_m / state.unit_m
             raise _LineError(f"{motion}: allowed: Z below R, and Q of {least:.3g} or more")
@@ -534,7 +550,8 @@ class _Reader:
             depth = above
             while depth > bottom:
                 if depth < above:
-                    self._lift(line, place, above, "G0")
+                    if motion == "G83":
+                        self._lift(line, place, above, "G0")
                     self._lift(line, place, min(depth + _CLOSE_m, above), "G0")
                 depth = max(depth - peck_m, bottom)
                 self._lift(line, place, depth, "G1")

@@ -17,14 +17,20 @@ from cdpr_rt.motion.path.description import PathError
 _WORD: Final = re.compile(r"\s*([A-Za-z])\s*((?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?)")
 _EXPONENT: Final = re.compile(r"[eE][+-]?[0-9]")
 _CODE: Final = re.compile(r"[GM]\s*[0-9]", re.IGNORECASE)
-_FIRST_CODE: Final = re.compile(r"(?:[NT]\s*[0-9]+\s*)*M\s*0*([0-9]+)(?![0-9.])", re.IGNORECASE)
+_FIRST_CODE: Final = re.compile(
+    r"(?:[NT]\s*[0-9]+\s*)*M\s*0*([0-9]+)(?:(?<=862)\.[0-9])?(?![0-9.])", re.IGNORECASE
+)
+_MACRO: Final = re.compile(r"[A-Z_]{3,}[A-Z0-9_]*", re.IGNORECASE)
+"""Name of a macro, as printers' firmware has them."""
+_SETTING: Final = re.compile(r"\$[0-9]+\s*=")
 _FULL_SPEED: Final = re.compile(r"S\s*100(\.0*)?(?![0-9.])", re.IGNORECASE)
 _CHECKSUM: Final = re.compile(r"\*\s*[0-9]+\s*$")
 _LINE_END: Final = re.compile(r"\r\n|\r|\n")
 _PROGRAM_NUMBER: Final = re.compile(r"[O:]\s*[0-9]+$", re.IGNORECASE)
-_QUERIES: Final = frozenset(("$", "$$", "$#", "$G", "$I", "$N", "$X", "?"))
-"""Commands to grbl that do not move the machine."""
+_QUERIES: Final = frozenset(("$", "$$", "$#", "$G", "$H", "$I", "$N", "$X", "?"))
+"""Commands to grbl that do not move the machine, or only to its switches."""
 _MOST_DIGITS: Final = 40
+_LONGEST_NAME: Final = 60
 _LARGEST_VALUE: Final = 1e9
 _MOST_CHARS: Final = 4096
 """Largest length of a line."""
@@ -45,13 +51,15 @@ _TEXTS: Final = frozenset(("M117", "M118"))
 _IDLE_LINES: Final = _TEXTS | {
     f"M{number}"
     for number in (
-        17, 18, 20, 21, 27, 31, 42, 73, *range(75, 79), *range(80, 86), 92, *range(104, 117), 119,
-        140, 141, 150, 155, 190, 191, *range(200, 206), 207, 208, 209, 211, 300, 301, 302, 304,
-        221, 400, *range(500, 505), 569, 572, 593, 900, 905, 906, 907, 913, 914,
+        17, 18, 19, 20, 21, 27, 31, 42, *range(50, 54), *range(62, 66), 67, 68, 73, *range(75, 79),
+        *range(80, 86), 92, *range(104, 117), 119, 140, 141, 150, 155, 190, 191, *range(200, 206),
+        207, 208, 209, 211, 221, 240, 280, 300, 301, 302, 304, 355, 400, 401, 402, 412, 413, 420,
+        486, *range(500, 505), 555, 566, 569, 572, 593, 701, 702, 851, 862, 900, 905, 906, 907, 913,
+        914,
     )
 }  # fmt: skip
-"""Codes for printers: heaters, fans, displays, and limits of another machine."""
-_NEVER: Final = frozenset(("M2", "M30", "M97", "M98", "M99", "M206"))
+"""Codes for printers (heaters, fans, displays), outputs, and limits of another machine."""
+NEVER_IGNORED: Final = frozenset(("M2", "M30", "M97", "M98", "M99", "M206"))
 """Codes that end a file, call another file or move its zero."""
 _WORDS_OF_MOTIONS: Final = frozenset("FGIJKLMNOPQR")
 
@@ -118,17 +126,19 @@ def require_ignorable(source: str, ignored: frozenset[str], axes: list[str]) -> 
     for name in sorted(ignored):
         if len(name) == 1 and (name in axes or name in _WORDS_OF_MOTIONS):
             raise PathError(source, 0, f"--ignore {name}: the path depends on it")
-        if len(name) > 1 and name[0] not in "GM":
+        if len(name) > 1 and name[0] not in "GM" and not _MACRO.fullmatch(name):
             raise PathError(source, 0, f"--ignore {name}: allowed: {name[0]}, without a number")
-        if name in _NEVER or (name[0] == "G" and len(name) > 1 and name not in _IDLE_CODES):
+        is_code = name[0] == "G" and len(name) > 1 and not _MACRO.fullmatch(name)
+        if name in NEVER_IGNORED or (is_code and name not in _IDLE_CODES):
             raise PathError(source, 0, f"--ignore {name}: other lines depend on it")
 
 
 def blocks(text: str, findings: Findings, ignored: frozenset[str] = frozenset()) -> Iterator[Block]:
     """Yield the lines with content, up to the end of the program.
 
-    `ignored` are letters that are dropped and M codes whose lines are skipped, in addition to those
-    without meaning for a platform. Unreadable lines are recorded as problems, not yielded.
+    `ignored` are letters that are dropped, and M codes and macros whose lines are skipped, in
+    addition to those without meaning for a platform. Unreadable lines are recorded as problems, not
+    yielded.
     """
     percents = 0
     for number, full in enumerate(_LINE_END.split(text.removeprefix("\ufeff")), 1):
@@ -179,6 +189,8 @@ def _block(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
     """Return the content of a line; None for an empty line or one that cannot be read."""
     if line.upper() in _QUERIES:
         findings.ignore(number, line.upper())
+    elif _SETTING.match(line):
+        findings.ignore(number, "settings of grbl ($)")
     elif line and not _PROGRAM_NUMBER.match(line):
         if _CHECKSUM.search(line):
             findings.ignore(number, "checksums")
@@ -193,7 +205,11 @@ def _block(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
 
 
 def _is_skipped(line: str, number: int, findings: Findings, ignored: frozenset[str]) -> bool:
-    """Return whether a line begins with an M code for which the whole line is skipped."""
+    """Return whether the whole line is skipped, because of its first code or macro."""
+    macro = _MACRO.match(line)
+    if macro is not None and macro[0].upper() in ignored:
+        findings.ignore(number, f"the line of {macro[0].upper()}")
+        return True
     first = _FIRST_CODE.match(line)
     name = "" if first is None else f"M{int(first[1])}"
     if name in _TEXTS:
@@ -223,7 +239,11 @@ def _unreadable(line: str) -> str:
     if line[0] in "Oo":
         return "O-words (subroutines, branches, loops) are not supported; allowed: plain lines"
     if line[0] == "$":
-        return f"{line[:20]}: a command to a controller, not G-code"
+        return f"{line[:20]}: a command to a controller, not G-code; remove it"
+    if macro := _MACRO.match(line):
+        name = macro[0][:_LONGEST_NAME].upper()
+        advice = f"if it neither moves nor changes later lines, --ignore {name} skips its line"
+        return f"{name}: a macro, not G-code; {advice}"
     return ""
 
 

@@ -114,7 +114,12 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "F60", "G2 X5 R1"], ROOM, r":3: G2: R1 mm: its ends are 5 mm apart"),
         (["G0 X0 Y0 Z0", "F60", "G2 X5"], ROOM, r":3: G2: allowed: either I and J, or R"),
         (["G0 X0 Y0 Z0", "F60", "G18 G2 X5 I2.5 J1"], ROOM, r":3: J: has no meaning in .* G18"),
-        (["G0 X0 Y0 Z0", "G0 X1 I5"], ROOM, r":2: I: has no meaning with G0"),
+        (["G0 X0 Y0 Z0", "G0 X1 I5"], ROOM, r":2: I: has no meaning with G0; remove it, or give"),
+        (["G0 X0 Y0 Z0", "M97 P100"], ROOM, r":2: M97: subprograms are not supported$"),
+        (["G0 X0 Y0 Z0", "M206 X5"], ROOM, r":2: M206: is not supported$"),
+        (["G0 X0 Y0 Z0", "$J=G91 X5 F60"], ROOM, r":2: \$J=.*: a command to a controller.*remove"),
+        (["G0 X0 Y0 Z0", "G29 X5"], ROOM, r":2: G29: allowed only for printers, without axes"),
+        (["G0 X0 Y0 Z0", "START_PRINT T=1"], ROOM, r":2: START_PRINT: a macro.*--ignore START_PRI"),
         (["G0 X0 Y0 Z0", "G0 G1 X5"], ROOM, r":2: G0 G1: allowed: one"),
         (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: allowed: one"),
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
@@ -181,8 +186,32 @@ def test_words_of_tools_and_printers_are_ignored_with_one_notice():
         assert name in notice
 
 
-def test_ignoring_a_code_skips_its_whole_line():
+def test_heads_of_senders_and_slicers_are_ignored():
+    path = read(
+        "$H", "$32=1", "G29", "M862.3 P \"MK3S\"", "M555 X85 Y85 W85 H85", "G0 X0 Y0 Z0", "G11",
+        "M62 P0", "M67 E0 Q20", "G1 X5 F600", "M63 P0", "M30",
+    )  # fmt: skip
+    assert ends_mm(path) == [[5, 0, 0]]
+    (notice,) = path.notices
+    for name in ("$H", "settings of grbl", "G29", "G11", "M862", "M555", "M62", "M67"):
+        assert name in notice
+
+
+def test_the_end_of_a_cycle_may_share_a_line_with_a_motion():
+    path = read("G00 G71 G17 G90 G40 G49 G80", "X0 Y0 Z10", "F600 G81 X5 Z-1 R2", "G80 G1 X9", "M2")
+    assert ends_mm(path)[-2:] == [[5, 0, 10], [9, 0, 10]]
+
+
+def test_chips_are_broken_without_leaving_the_hole():
+    path = read("G0 X0 Y0 Z5 F600", "G73 X0 Y0 Z-2 R1 Q2", "M2")
+    heights = [end[2] for end in ends_mm(path)]
+    assert heights == pytest.approx([1, -1, -0.746, -2, 5])
+
+
+def test_ignoring_a_code_or_macro_skips_its_whole_line():
     path = read("G0 X0 Y0 Z0", "M777 X150 Y60 Z10", "G0 X5", "M2", ignored={"M777"})
+    assert ends_mm(path) == [[5, 0, 0]]
+    path = read("G0 X0 Y0 Z0", "Start_Print Z=10", "G0 X5", "M2", ignored={"START_PRINT"})
     assert ends_mm(path) == [[5, 0, 0]]
     with pytest.raises(PathError, match=r":2: M777 and G1 are on one line: divide it"):
         read("G0 X0 Y0 Z0", "M777 G1 X5", "M2", ignored={"M777"})
