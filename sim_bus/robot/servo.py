@@ -69,8 +69,17 @@ def _approach(value: float, goal: float, step: float) -> float:
 
 @jit
 def ramp_velocity(m: Any, goal: float, h: float) -> None:
-    """Move the reference velocity toward `goal`, braking when its magnitude falls."""
+    """Move the reference velocity toward `goal`, braking when its magnitude falls.
+
+    On the way to rest it is never faster than the motor, or a wrong measured speed at the start
+    of the ramp would accelerate it.
+    """
     v = m.reference_velocity
+    if goal == 0.0:
+        excess = m.standstill_velocity
+        v = max(
+            min(v, max(m.observed_velocity + excess, 0.0)), min(m.observed_velocity - excess, 0.0)
+        )
     braking = v * (goal - v) < 0.0
     step = (m.deceleration if braking else m.acceleration) * h
     if braking and v * goal < 0.0:

@@ -70,6 +70,20 @@ def test_exceeding_a_lowered_speed_limit_faults_the_drive_with_8400h() -> None:
     assert abs(rig.truth[1]) < 0.1
 
 
+@pytest.mark.parametrize("counts", [4000, -4000])
+def test_a_reaction_to_the_speed_of_an_encoder_jump_does_not_accelerate_the_motor(
+    counts: int,
+) -> None:
+    rig = rig_with(load={"inertia_kg_m2": 1e-3})
+    rig.enable(10)
+    start = rig.truth[0]
+    rig.write(0x2F00, counts, 11)
+    rig.until(lambda: rig.status & 0x4F == FRA, 0.1)
+    rig.until(lambda: rig.status & 0x4F == FAULT, 3.0)
+    assert rig.read(0x603F) == 0x8400
+    assert abs(rig.truth[0] - start) < 0.5
+
+
 def test_i2t_warns_then_trips_and_must_cool_before_a_reset() -> None:
     rig = rig_with(
         drive={"i2t_time_constant_s": 0.5},
