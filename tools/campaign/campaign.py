@@ -10,7 +10,7 @@ from typing import Final
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.diagnosis.checks import refuse_impossible
-from cdpr_tools.campaign.farm import Seeds
+from cdpr_tools.campaign.farm import DID_NOT_START, Seeds
 from cdpr_tools.campaign.judge import Result
 from cdpr_tools.campaign.scenario import Scenario, draw
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -154,3 +154,20 @@ def table(results: Sequence[Result]) -> list[str]:
         cells = [str(counts[fault, one] or "-").rjust(len(one)) for one in outcomes]
         lines.append("  ".join([fault.ljust(wide), *cells]))
     return lines
+
+
+def summary(results: Sequence[Result]) -> list[str]:
+    """Return which robots did not start, the number of failing seeds, and the pace, as lines."""
+    unstarted = Counter(
+        f"{result.robot} {note}"
+        for result in results
+        for note in result.notes
+        if note.startswith(DID_NOT_START)
+    )
+    failing = sum(bool(result.violations) for result in results)
+    cpu_s = sum(result.cpu_s for result in results)
+    pace = f", {3600.0 * len(results) / cpu_s:.0f} an hour and core" if cpu_s else ""
+    return [
+        *(f"{count} seeds: {text}" for text, count in unstarted.items()),
+        f"{len(results)} seeds, {failing} failing{pace}",
+    ]

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from cdpr_rt.robot import Error
-from cdpr_tools.campaign.judge import Result, judge
+from cdpr_tools.campaign.judge import Result, judge, predicted
 from cdpr_tools.campaign.play import STARTS, Played, Player, RobotAtStart, output_to
 from cdpr_tools.campaign.scenario import Scenario
 from cdpr_tools.processes import module_command
@@ -30,6 +30,7 @@ _SEED_CPU_S: Final = 90
 """Time of a processor after which a seed counts as hung."""
 _SEED_S: Final = 900.0
 """The same by the wall clock, for a seed that waits."""
+DID_NOT_START: Final = "did not start"
 _OUTPUT: Final = "output.txt"
 _AT_MOST: Final = 4000
 
@@ -97,10 +98,17 @@ def _serve() -> None:
 def run_scenarios(scenarios: Sequence[Scenario]) -> list[Result]:
     """Run scenarios of one robot with one plant, from snapshots; return results in their order."""
     found: dict[int, Result] = {}
+    predicted(scenarios[0].robot)  # once for all forks
     lines = _in_fork(lambda out: _from_snapshots(scenarios, out), _SEED_S * (1 + len(scenarios)))
+    start_s = 0.0
     for data in lines:
         number = data.pop("number")
-        found[number] = _result(data)
+        if number is None:
+            start_s = data["cpu_s"] / len(scenarios)
+        else:
+            found[number] = _result(data)
+    for result in found.values():
+        result.cpu_s = round(result.cpu_s + start_s, 3)
     return [
         found.get(i) or Result(one.seed, one.robot, [f"crash: no result: {lines.end}"])
         for i, one in enumerate(scenarios)
@@ -126,10 +134,13 @@ def _from_snapshots(scenarios: Sequence[Scenario], out: int) -> None:
                 for number, scenario in enumerate(scenarios):
                     if scenario.start != where:
                         continue
-                    result = Result(scenario.seed, scenario.robot, notes=[f"did not start: {why}"])
+                    result = Result(
+                        scenario.seed, scenario.robot, notes=[f"{DID_NOT_START}: {why}"]
+                    )
                     if not why:
                         result = _fork_seed(scenario, start, folder)
                     _write(out, asdict(result) | {"number": number})
+        _write(out, {"number": None, "cpu_s": time.process_time()})
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 
-from cdpr_profiles import Robot
+from cdpr_profiles import Robot, load_robot
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.diagnosis.predictions import Loss, corner_swings, slips
+from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_tools.campaign.play import Played
-from cdpr_tools.campaign.scenario import TIGHT
+from cdpr_tools.campaign.scenario import BEFORE_BOOT
 
 _TORQUE_Nm: Final = 1e-3
 _DEAD_WITHIN_S: Final = 1.5
 """Longest time of the drives until they are without power, after their master has died."""
 _FELL_m: Final = 0.05
-_TENSION_OVER: Final = 1.25
+_OVER: Final = 1.25
 _RISE_MB: Final = 150.0
 
 
@@ -32,8 +37,35 @@ class Result:
     """Each fault that was injected, and what became of it."""
     digest: str = ""
     cpu_s: float = 0.0
+    """Time of a processor, with the seed's share of the start of its robot."""
     bus_s: float = 0.0
     notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What `cdpr robot show` predicts, with a margin."""
+
+    fastest_m_s: list[float]
+    """Speed downward after the loss of each cable or drive, or of the lengths."""
+    peak_N: FloatArray
+    """Tension of each cable after a slip, or by all the torque of its motor."""
+
+
+@lru_cache(maxsize=1)
+def predicted(robot: str) -> Predicted:
+    """Return what is predicted for a robot, by its name or file."""
+    s = Subject(load_robot(robot))
+    own_m_s = s.platform.speed_m_s
+    lost = {
+        loss: [max((swing.fastest_m_s for swing in swings), default=math.inf) for swings in found]
+        for loss, found in ((loss, corner_swings(s, loss)) for loss in Loss)
+    }
+    fastest_m_s = [
+        _OVER * max(cable, drive, *lost[Loss.LENGTHS]) + own_m_s
+        for cable, drive in zip(lost[Loss.CABLE], lost[Loss.DRIVE], strict=True)
+    ]
+    return Predicted(fastest_m_s, _OVER * np.array([slip.peak_N for slip in slips(s)]))
 
 
 class Judge:
@@ -44,7 +76,9 @@ class Judge:
         self.limits = limits_of(robot)
         self.truth, self.n = played.truth, len(robot.axes)
         self.end = played.statuses[-1] if played.statuses else {}
-        self.causes = [Cause(fault, played.began_s) for fault in played.scenario.faults]
+        self.causes = [
+            Cause(one, played.began_s) for one in played.scenario.faults if one["value"] != 0
+        ]
 
     @property
     def disturbed_s(self) -> float:
@@ -64,6 +98,18 @@ class Judge:
                     seen.add(key)
                     yield fault, status["at_s"], i == 0
 
+    def periods(self) -> Iterator[tuple[dict[str, Any], float]]:
+        """Yield each status, and when the next one replaced it or the loop died."""
+        played = self.played
+        ends_s = [status["at_s"] for status in played.statuses[1:]] + [math.inf]
+        for status, end_s in zip(played.statuses, ends_s, strict=True):
+            yield status, end_s if played.dead_s is None else min(end_s, played.dead_s)
+
+    def works_at(self, at_s: float) -> bool:
+        """Return whether the robot had power and no fault at a time."""
+        then = [status for status in self.played.statuses if status["at_s"] <= at_s]
+        return bool(then) and then[-1]["state"] == "active" and then[-1]["reacting"] == "none"
+
     def off_since(self) -> float | None:
         """Return the bus time since when no motor has had a torque; None if some has."""
         powered = np.flatnonzero((np.abs(self.truth["torque_Nm"]) > _TORQUE_Nm).any(axis=1))
@@ -73,13 +119,28 @@ class Judge:
             return None
         return float(self.truth["time_s"][powered[-1]])
 
+    @property
+    def up(self) -> int:
+        """Number of the coordinate that points upward."""
+        return 1 if self.robot.platform is not None and self.robot.platform.is_planar else 2
+
+    @property
+    def pushed(self) -> bool:
+        """Whether something moved the platform from outside."""
+        return any(cause.name in _FROM_OUTSIDE for cause in self.causes)
+
+    @property
+    def ended(self) -> bool:
+        """Whether a user or a dead or stalled loop may have taken the power."""
+        return any(name in ("power off", "stall", "die") for name, _ in self.played.done)
+
     def fall_m(self) -> float:
-        """Return how far the platform has moved since the power went off for the last time."""
+        """Return how far the platform has come down since the last power went off."""
         off_s = self.off_since()
         if off_s is None:
             return 0.0
-        position = self.truth["position_m"][self.truth["time_s"] >= off_s]
-        return float(np.linalg.norm(position - position[0], axis=1).max())
+        height_m = self.truth["position_m"][self.truth["time_s"] >= off_s, self.up]
+        return float(height_m[0] - height_m.min())
 
 
 class Cause:
@@ -91,20 +152,45 @@ class Cause:
 
     def explains(self, named: dict[str, Any]) -> bool:
         """Return whether a fault that the robot named may follow from this one."""
-        axis, limit = named["axis"], named["limit"]
+        axis, limit, code = named["axis"], named["limit"], named["code"]
+        if self.name not in _MAY_CAUSE.get(code, (self.name,)):
+            return False
+        if self.name in _WORDS_ONLY and limit != "drive":
+            return False
         if axis in (self.axis, -1) or self.axis in named["suspects"] or self.name in _ANYWHERE:
             return True
-        return limit in _PULLED and self.name in _PULLING
+        return limit in _PULLED and self.name not in _ON_THE_BUS
 
 
-_PULLED: Final = ("tension_high", "lengths", "lengths_jump")
-"""Limits that cables exceed because another cable pulls too much, or no longer."""
-_PULLING: Final = (
-    "cut-cable", "slip", "encoder-jump", "encoder-frozen", "encoder-noise", "pre-operational",
-    "caught-cable", "torque-stuck", "torque-bias", "torque-limit", "commands-ignored",
+_GONE: Final = ("drive-off", "drive-reboot", "bus-off", "bus-lost", "silence")
+_NOT_OPERATIONAL: Final = ("pre-operational", "nmt-stop", "duplicate-node")
+_ON_THE_BUS: Final = (
+    "no-heartbeat", "heartbeat-late", "emcy", "emcy-flood", "frames-doubled", "index-missed",
 )  # fmt: skip
-_ANYWHERE: Final = ("push-x", "push-y", "obstacle", "payload", "bus-lost")
+_WORDS_ONLY: Final = ("no-heartbeat", "heartbeat-late", "emcy", "emcy-flood")
+"""Faults that change neither motion nor answers to SYNC."""
+_MAY_CAUSE: Final = {
+    "silent": (*_GONE, *_NOT_OPERATIONAL, "frames-lost", "frames-lossy", "frames-late"),
+    "unsteady": (*_GONE, "frames-lost", "frames-lossy", "frames-late"),
+    "doubled": ("frames-doubled", "frames-late"),
+    "no_heartbeat": (*_GONE, "no-heartbeat", "heartbeat-late"),
+    "restarted": ("drive-reboot", "drive-off", "duplicate-node"),
+    "not_operational": (*_GONE, *_NOT_OPERATIONAL),
+    "flooding": ("emcy-flood",),
+    "FF00h": ("emcy", "emcy-flood"),
+    "7305h": ("drive-fault",),
+}
+"""For codes of faults, the faults that may cause them; other codes may have any cause."""
+_PULLED: Final = ("tension_high", "lengths", "lengths_jump", "slack", "broken_cable")
+"""Limits that cables exceed because another cable pulls too much, or no longer."""
+_FROM_OUTSIDE: Final = ("push-x", "push-y", "push-z", "obstacle", "payload")
+_ANYWHERE: Final = (*_FROM_OUTSIDE, "bus-lost")
 """Faults that concern all axes."""
+_SURE: Final = (
+    "drive-off", "drive-reboot", "drive-fault", "power-lost", "pre-operational", "nmt-stop",
+    "bus-off", "bus-lost", "emcy-flood",
+)  # fmt: skip
+"""Faults that no running robot may miss."""
 
 
 # The invariants. Each yields what was violated.
@@ -114,12 +200,24 @@ Invariant = Callable[[Judge], Iterator[str]]
 
 def no_torque_afterwards(j: Judge) -> Iterator[str]:
     """A robot that reports no power has none: people go near it."""
-    if j.end and j.end["state"] in ("ready", "fault", "inactive", "unconfigured"):
-        settled = j.played.settled_s
-        if settled is not None and j.played.dead_s is None and j.played.recovered is None:
-            late = j.truth[j.truth["time_s"] > settled + 0.05]
-            if (np.abs(late["torque_Nm"]) > _TORQUE_Nm).any():
-                yield f"a motor has torque in state {j.end['state']}"
+    powered = np.abs(j.truth["torque_Nm"]) > _TORQUE_Nm
+    for status, end_s in j.periods():
+        if status["state"] not in _WITHOUT_POWER or status["busy"] or _unsure(status):
+            continue
+        time_s = j.truth["time_s"]
+        here = (time_s > status["at_s"] + _OFF_WITHIN_S) & (time_s < end_s)
+        for axis in np.flatnonzero(powered[here].any(axis=0)):
+            yield f"axis {axis + 1} has torque in state {status['state']}: {status['reason']}"
+
+
+_WITHOUT_POWER: Final = ("ready", "fault", "inactive", "unconfigured")
+_OFF_WITHIN_S: Final = 0.05
+
+
+def _unsure(status: dict[str, Any]) -> bool:
+    """Return whether a status says that a drive may have power, or that a reaction goes on."""
+    unconfirmed = any(fault["code"].startswith("power_") for fault in status["faults"] or ())
+    return unconfirmed or status["reacting"] != "none"
 
 
 def dead_loop_has_no_torque(j: Judge) -> Iterator[str]:
@@ -135,7 +233,7 @@ def falls_are_reported(j: Judge) -> Iterator[str]:
     if j.played.dead_s is not None or j.played.recovered is not None or not j.end:
         return
     fell_m = j.fall_m()
-    if fell_m > _FELL_m and not (j.end["last_stop"] or {}).get("fallen"):
+    if fell_m > _FELL_m and not j.pushed and not (j.end["last_stop"] or {}).get("fallen"):
         yield f"the platform fell {1e3 * fell_m:.0f} mm, and the status does not say so"
 
 
@@ -151,24 +249,57 @@ def causes_are_true(j: Judge) -> Iterator[str]:
 
 def causes_are_named(j: Judge) -> Iterator[str]:
     """Without its cause, a fault cannot be repaired."""
-    if not j.end or j.end["state"] != "fault":
-        return
-    if not j.end["reason"]:
+    if j.end and j.end["state"] == "fault" and not j.end["reason"]:
         yield "state fault without a reason"
+    if j.played.dead_s is not None or j.played.scenario.start == BEFORE_BOOT:
+        return
+    named = [fault for fault, _, _ in j.named()]
+    for cause in j.causes:
+        if cause.name not in _SURE or not j.works_at(cause.at_s):
+            continue
+        if not any(fault["axis"] == cause.axis or cause.explains(fault) for fault in named):
+            yield f"{cause.name} of axis {cause.axis + 1} is not named"
+
+
+def falls_have_a_cause(j: Judge) -> Iterator[str]:
+    """The winches lower a platform before its power goes off, unless none of them can."""
+    fell_m, reason = j.fall_m(), str(j.end.get("reason"))
+    lost = {cause.axis for cause in j.causes if cause.name not in _WORDS_ONLY}
+    unavoidable = len(lost) > 1 or any(cause.name == "bus-lost" for cause in j.causes)
+    warned = "it may fall when the power goes off" in reason
+    if fell_m > _FELL_m and not (unavoidable or warned or j.pushed or j.ended):
+        yield f"the platform fell {1e3 * fell_m:.0f} mm without power: {reason}"
+
+
+def descents_are_predicted(j: Judge) -> Iterator[str]:
+    """Whoever stands below must know how fast a platform may come down."""
+    if len(j.causes) != 1 or j.ended or j.causes[0].name in _ANYWHERE:
+        return
+    cause, fastest_m_s = j.causes[0], -float(j.truth["velocity_m_s"][:, j.up].min())
+    allowed_m_s = predicted(j.played.scenario.robot).fastest_m_s[cause.axis]
+    if fastest_m_s > allowed_m_s:
+        yield f"the platform came down at {fastest_m_s:.2f} m/s, {allowed_m_s:.2f} m/s predicted"
 
 
 def limits_are_kept(j: Judge) -> Iterator[str]:
     """Until something breaks, the control keeps tensions and speeds within the limits."""
-    if j.played.scenario.start != TIGHT:
-        return
-    until_s = j.disturbed_s
-    before = j.truth[j.truth["time_s"] < until_s]
-    if not before.size:
-        return
-    most = np.broadcast_to(j.limits.tension_max_N, (j.n,)) * _TENSION_OVER
-    for axis in np.flatnonzero((before["tension_N"] > most).any(axis=0)):
-        peak = before["tension_N"][:, axis].max()
-        yield f"axis {axis + 1}: tension {peak:.0f} N before any fault, {most[axis]:.0f} N allowed"
+    before = j.truth[j.truth["time_s"] < j.disturbed_s]
+    figures = {"tension_N": j.limits.tension_max_N, "motor_rad_s": j.limits.speed_rad_s}
+    for name, limit in figures.items():
+        if before.size:
+            most = np.broadcast_to(limit, (j.n,)) * _OVER
+            peaks = np.abs(before[name]).max(axis=0)
+            for axis in np.flatnonzero(peaks > most):
+                allowed = f"{peaks[axis]:.0f}, {most[axis]:.0f} allowed"
+                yield f"axis {axis + 1}: {name} before any fault {allowed}"
+
+
+def tensions_are_predicted(j: Judge) -> Iterator[str]:
+    """Cables, frame and platform must withstand what faults do."""
+    peaks = j.truth["tension_N"].max(axis=0) if j.truth.size else np.zeros(j.n)
+    for axis in np.flatnonzero(peaks > predicted(j.played.scenario.robot).peak_N):
+        most = predicted(j.played.scenario.robot).peak_N[axis]
+        yield f"axis {axis + 1}: tension {peaks[axis]:.0f} N, at most {most:.0f} N predicted"
 
 
 def commands_are_answered(j: Judge) -> Iterator[str]:
@@ -234,9 +365,10 @@ def memory_is_bounded(j: Judge) -> Iterator[str]:
 
 
 INVARIANTS: Final[tuple[Invariant, ...]] = (
-    no_torque_afterwards, dead_loop_has_no_torque, falls_are_reported, causes_are_true,
-    causes_are_named, limits_are_kept, commands_are_answered, comes_to_rest, works_again,
-    no_exception, numbers_are_finite, recordings_are_complete, memory_is_bounded,
+    no_torque_afterwards, dead_loop_has_no_torque, falls_are_reported, falls_have_a_cause,
+    descents_are_predicted, causes_are_true, causes_are_named, limits_are_kept,
+    tensions_are_predicted, commands_are_answered, comes_to_rest, works_again, no_exception,
+    numbers_are_finite, recordings_are_complete, memory_is_bounded,
 )  # fmt: skip
 
 

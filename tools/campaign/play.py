@@ -38,6 +38,8 @@ _RING_S: Final = 60.0
 _RECORDING: Final = "recording"
 _MOST_ROUNDS: Final = 4
 _LEASE_S: Final = 2.5
+BY_HAND: Final = "take up slack by hand"
+"""A remedy that the status gives, and that no command can carry out."""
 
 
 @dataclass
@@ -60,6 +62,7 @@ class Played:
     recovery: list[str] = field(default_factory=list)
     """Steps that were taken to work again, and the reason why one failed."""
     recovered: bool | None = None
+    """Whether the robot works again; None if that was not tried, or needs work by hand."""
     truth: Any = None
     """Records of the pose log since the beginning."""
     rows: Any = None
@@ -89,7 +92,11 @@ class RobotAtStart:
             self.rig.boot()
         elif start == TIGHT:
             self.rig.enable()
-            self.rig.carry_out("tighten", _TIGHTEN_S)
+            self.rig.program("tighten")
+            self.rig.finish(_TIGHTEN_S)
+            progress = self.rig.progress
+            if not progress["tight"]:  # friction may hold a tight platform off its target
+                raise Error(f"tighten: {progress.get('trouble')}")
 
 
 STARTS: Final = (BEFORE_BOOT, READY, TIGHT)
@@ -296,13 +303,15 @@ class Player:
             rig.right.take("campaign")
         self._run(0.1)
         played.recovered = False
+        # the hand that has pushed a loose platform from its stand also carries it back
+        pushed = any(fault["fault"].startswith("push") for fault in self._scenario.faults)
         for _ in range(_MOST_ROUNDS):
             status = rig.status() | {"robot": rig.robot.profile}
             steps = " ".join(map(str.strip, next_steps(status)))
             if not steps:
                 break
             played.recovery.append(steps)
-            if (status["last_stop"] or {}).get("fallen"):
+            if (status["last_stop"] or {}).get("fallen") or (pushed and not status["driving"]):
                 self._simulator.inject("put-back")
                 self._run(0.1)
             for step in re.findall(r"`cdpr (check|ack|enable|tighten --from home|tighten)`", steps):
@@ -333,11 +342,15 @@ class Player:
         self._run_until(
             lambda: rig.loop.engine.program is not program or program.at_rest, _TIGHTEN_S
         )
+        progress = program.progress()
         trouble = "" if rig.loop.engine.program is program else rig.state_text()
-        trouble = trouble or str(program.progress().get("trouble") or "")
+        if not progress.get("tight"):  # friction may hold a tight platform off its target
+            trouble = trouble or str(progress.get("trouble") or "")
         trouble = trouble or ("" if program.at_rest else "not done in time")
         if trouble:
             played.recovery.append(f"{name}: {trouble}")
+        if BY_HAND in trouble:
+            played.recovered = None
         return not trouble
 
     def _truth_size(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Self
@@ -13,6 +13,7 @@ from typing import Any, Final, Self
 from cdpr_profiles import Robot
 from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.errors import ProfileError
+from cdpr_sim_bus.cia402.faults import FAULTS
 from cdpr_tools.errors import BadInputError
 
 BEFORE_BOOT, READY, TIGHT = "before boot", "ready", "tight"
@@ -24,6 +25,8 @@ Action = dict[str, Any]
 _SEEDS_A_PLANT: Final = 100
 _RECOVERED, _RECORDED, _DYING = 0.2, 0.1, 0.08
 _CLOSE_S: Final = 0.05
+_IN_TRANSITION: Final = 0.3
+_TRANSITIONS: Final = ("enable", "tighten", "lower", "disable", "stop")
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,10 @@ class Scenario:
     start: str
     actions: tuple[Action, ...]
     faults: tuple[dict[str, Any], ...]
-    """Orders of the simulator: `fault`, `axis` from 1, `value`, and `at_s` since the beginning."""
+    """Orders of the simulator: `fault`, `axis` from 1, `value`, and `at_s` since the beginning.
+
+    The value 0 ends a fault.
+    """
     recovers: bool
     """Whether the faults are repaired at the end, and the robot must work again."""
     recorded: bool
@@ -81,17 +87,30 @@ def draw(seed: int, robots: Sequence[tuple[str, Robot]]) -> Scenario:
         ]
     if rng.random() < _DYING:
         actions.append({"do": "die", "wait_s": 0.0})
-    span_s = 0.3 + sum(action["wait_s"] for action in actions)
-    at_s = sorted(rng.uniform(0.0, span_s) for _ in range(rng.randint(1, 3)))
+    begun_s = _beginnings(actions)
+    at_s = sorted(rng.uniform(0.0, begun_s[-1] + 0.3) for _ in range(rng.randint(1, 3)))
     if start == BEFORE_BOOT and rng.random() < 0.7:
         at_s[0] = rng.uniform(0.0, 0.3)
+    elif rng.random() < _IN_TRANSITION:  # while it is enabled, tightened, lowered or stopped
+        changes = [i for i, action in enumerate(actions) if action["do"] in _TRANSITIONS]
+        at_s[0] = begun_s[rng.choice(changes)] + rng.uniform(0.0, 0.5) if changes else at_s[0]
     if len(at_s) > 1 and rng.random() < 0.4:
         at_s[1] = at_s[0] + rng.uniform(0.0, _CLOSE_S)
+    planar = robot.platform is not None and robot.platform.is_planar
+    kinds = [name for name in DRAWN if not (planar and FAULTS[name].needs == "space")]
     return Scenario(
         seed, name, _plant(seed // _SEEDS_A_PLANT, robot), start, tuple(actions),
-        tuple(_fault(rng, len(robot.axes), one) for one in at_s),
+        tuple(fault for one in at_s for fault in _faults(rng, rng.choice(kinds), robot, one)),
         rng.random() < _RECOVERED, rng.random() < _RECORDED,
     )  # fmt: skip
+
+
+def _beginnings(actions: Sequence[Action]) -> list[float]:
+    """Return when each action begins, and when the last one is over, since the beginning."""
+    times_s = [0.0]
+    for action in actions:
+        times_s.append(times_s[-1] + action.get("seconds", 0.0) + action["wait_s"])
+    return times_s
 
 
 def _plant(number: int, robot: Robot) -> dict[str, Any]:
@@ -169,22 +188,36 @@ def _arguments(rng: random.Random, robot: Robot, name: str) -> dict[str, Any]:
 # What breaks.
 
 
-def _fault(rng: random.Random, axes: int, at_s: float) -> dict[str, Any]:
-    name = rng.choice(tuple(FAULTS))
-    values = FAULTS[name]
-    value = None
-    if values:
-        low, high = values
-        value = rng.uniform(low, high)
-        if isinstance(low, int):
-            value = round(value)
+def _faults(rng: random.Random, name: str, robot: Robot, at_s: float) -> Iterator[dict[str, Any]]:
+    value: float | None = None
+    if values := DRAWN[name]:
+        value = rng.randint(*values) if isinstance(values[0], int) else rng.uniform(*values)
+        if name in _A_KILOGRAM and robot.platform is not None:
+            value *= robot.platform.mass_kg
         value = _round(value)
-    return {"fault": name, "axis": rng.randint(1, axes), "value": value, "at_s": _round(at_s)}
+    fault = {"fault": name, "axis": rng.randint(1, len(robot.axes)), "value": value}
+    yield fault | {"at_s": _round(at_s)}
+    if name.startswith("push"):
+        yield fault | {"value": 0, "at_s": _round(at_s + rng.uniform(0.1, 0.6))}
 
 
-FAULTS: Final[dict[str, tuple[float, float] | None]] = {
-    "cut-cable": None, "slip": (5, 300), "encoder-jump": (-4000, 4000), "drive-fault": None,
-    "silence": (1, 400), "pre-operational": None, "frames-lost": (1, 8),
-    "frames-doubled": (1, 60), "frames-late": (1, 8), "no-heartbeat": None, "emcy-flood": (1, 12),
+_A_KILOGRAM: Final = ("push-x", "push-y", "push-z", "payload")
+"""Faults whose values are drawn for a kilogram of the platform."""
+DRAWN: Final[dict[str, tuple[Any, Any] | None]] = {
+    "drive-off": None, "drive-reboot": None, "drive-fault": None, "power-lost": None,
+    "pre-operational": None, "nmt-stop": None, "commands-ignored": None,
+    "torque-stuck": None, "torque-bias": (-1.0, 1.0), "torque-limit": (0.05, 2.0),
+    "encoder-jump": (-4000, 4000), "encoder-frozen": None, "encoder-noise": (1.0, 200.0),
+    "index-missed": None,
+    "silence": (1, 400), "bus-off": None, "bus-lost": None, "frames-lost": (1, 8),
+    "frames-lossy": (1.0, 60.0), "frames-doubled": (1, 60), "frames-late": (1, 8),
+    "frames-corrupted": (1, 4), "duplicate-node": None, "no-heartbeat": None,
+    "heartbeat-late": (50, 1000), "emcy": (0x1000, 0xFFFF), "emcy-flood": (1, 12),
+    "cut-cable": None, "slip": (5, 300), "caught-cable": None,
+    "push-x": (-5.0, 5.0), "push-y": (-5.0, 5.0), "push-z": (-5.0, 5.0),
+    "obstacle": (1.0, 200.0), "payload": (0.05, 1.0),
 }  # fmt: skip
-"""Faults that are drawn, and the range of their values; None for the usual value."""
+"""Faults that are drawn, and the range of their values; None for the usual value.
+
+All of the simulator's but those of load cells, brakes and safety I/O, which these robots lack.
+"""

@@ -76,7 +76,7 @@ def campaign(
     out.say(*plays.table(results))
     for result in failing:
         out.say(f"seed {result.seed}, {result.robot}:", *(f"  {v}" for v in result.violations))
-    out.say(f"{len(results)} seeds, {len(failing)} failing")
+    out.say(*plays.summary(results))
     out.result({"ok": not failing, "results": [vars(result) for result in results]})
     if failing:
         raise typer.Exit(WorkFailedError.exit_status)

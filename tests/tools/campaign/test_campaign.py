@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from cdpr_here import cdpr_here
 
+from cdpr_profiles import Robot
+from cdpr_sim_bus.cia402.faults import FAULTS
 from cdpr_tools.campaign.campaign import drawn, shrunk
 from cdpr_tools.campaign.farm import Seeds, run_alone
-from cdpr_tools.campaign.scenario import BEFORE_BOOT, READY, TIGHT, Scenario
+from cdpr_tools.campaign.judge import INVARIANTS, judge
+from cdpr_tools.campaign.play import Played, Player, RobotAtStart
+from cdpr_tools.campaign.scenario import BEFORE_BOOT, DRAWN, READY, TIGHT, Scenario
 
 ROBOT = "planar-3"
 NOTHING = Scenario(0, ROBOT, {}, READY, ({"do": "enable", "wait_s": 0.1},), (), False, False)
@@ -52,6 +59,92 @@ def test_a_script_is_played_and_its_violation_sets_the_exit_status(tmp_path: Pat
     done = cdpr_here("sim", "campaign", "--script", str(script), "--json")
     assert done.returncode == 1
     assert not json.loads(done.stdout.splitlines()[-1])["ok"]
+
+
+def test_all_faults_of_a_robot_without_cells_brakes_and_safety_io_are_drawn() -> None:
+    left_out = {name for name in FAULTS if name not in DRAWN}
+    needs_more = {name for name, fault in FAULTS.items() if fault.needs == "board"}
+    assert left_out == needs_more | {"cell-off", "brake-worn", "brake-stuck", "put-back"}
+    faults = [fault for one in drawn(range(400), [ROBOT, "spatial-8"]) for fault in one.faults]
+    assert {fault["fault"] for fault in faults} == set(DRAWN)
+    for fault in faults:
+        if fault["value"]:
+            FAULTS[fault["fault"]].amount(fault["value"])  # raises ValueError
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Played, Robot]]:
+    """A drive with a fault, repaired, and the robot at work again."""
+    fault = {"fault": "drive-fault", "axis": 2, "value": None, "at_s": 0.3}
+    move = {"do": "move", "position_m": [0.1, 1.6], "wait_s": 0.5}
+    scenario = replace(NOTHING, start=TIGHT, actions=(move,), faults=(fault,), recorded=True)
+    start = RobotAtStart(scenario, tmp_path_factory.mktemp("day"))
+    with start.rig:
+        for where in (READY, TIGHT):
+            start.advance(where)
+        yield Player(scenario, start).play(), start.rig.robot
+
+
+def _changed(played: Played, name: str, at: Any, value: Any) -> Played:
+    """Return what was played with other values in one field of the truth."""
+    changed = replace(played, truth=played.truth.copy())
+    changed.truth[name][at] = value
+    return changed
+
+
+def _with_cause(played: Played, **fields: Any) -> Played:
+    statuses = [
+        status | {"faults": [fault | fields for fault in status["faults"] or ()]}
+        for status in played.statuses
+    ]
+    return replace(played, statuses=statuses)
+
+
+def _reply(played: Played, **fields: Any) -> Played:
+    return replace(played, replies=[played.replies[0] | fields])
+
+
+def _end(played: Played, **fields: Any) -> Played:
+    return replace(played, statuses=[*played.statuses[:-1], played.statuses[-1] | fields])
+
+
+_TAMPERED: dict[str, Callable[[Played], Played]] = {
+    "no_torque_afterwards": lambda p: _changed(p, "torque_Nm", (-1, 0), 0.1),
+    "dead_loop_has_no_torque": lambda p: replace(
+        _changed(p, "torque_Nm", (-1, 0), 0.1), dead_s=p.began_s
+    ),
+    "falls_are_reported": lambda p: _end(
+        _changed(p, "position_m", -1, -1.0), last_stop={"fallen": False}
+    ),
+    "falls_have_a_cause": lambda p: _changed(p, "position_m", -1, -1.0),
+    "descents_are_predicted": lambda p: _changed(p, "velocity_m_s", -1, -9.0),
+    "causes_are_true": lambda p: _with_cause(p, axis=0),
+    "causes_are_named": lambda p: _with_cause(p, axis=0),
+    "limits_are_kept": lambda p: _changed(p, "tension_N", (0, 1), 200.0),
+    "tensions_are_predicted": lambda p: _changed(p, "tension_N", (-1, 1), 2000.0),
+    "commands_are_answered": lambda p: _reply(p, ok=False, text=""),
+    "comes_to_rest": lambda p: replace(p, settled_s=None),
+    "works_again": lambda p: replace(p, recovered=False),
+    "no_exception": lambda p: replace(p, output="Traceback (most recent call last):"),
+    "numbers_are_finite": lambda p: _changed(p, "tension_N", (0, 0), np.nan),
+    "recordings_are_complete": lambda p: replace(p, recordings=[]),
+    "memory_is_bounded": lambda p: replace(p, rise_MB=1000.0),
+}
+
+
+def test_a_fault_that_the_robot_names_violates_nothing(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    result = judge(played, robot)
+    assert not result.violations
+    assert result.faults == [("drive-fault", "stopped, named")]
+    assert set(_TAMPERED) == {invariant.__name__ for invariant in INVARIANTS}
+
+
+@pytest.mark.parametrize("invariant", _TAMPERED)
+def test_each_invariant_finds_its_violation(invariant: str, day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    violations = judge(_TAMPERED[invariant](played), robot).violations
+    assert invariant in {violation.partition(":")[0] for violation in violations}
 
 
 @pytest.mark.long
