@@ -42,6 +42,7 @@ _COUNTERS: Final = np.dtype(
         ("capacity", "<u8"),
         ("loop_pid", "<i8"),
         ("service_pid", "<i8"),
+        ("procedure_pid", "<i8"),  # process that the service runs on the loop's buses, or 0
         ("start_monotonic_ns", "<i8"),  # the same instant on both clocks, read once
         ("start_realtime_ns", "<i8"),
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.clock import Task
+from cdpr_rt.core.clock import Task, TaskCancelled
 from cdpr_rt.core.shared_block import SharedBlockError
 from cdpr_rt.core.states import LoopState, Reaction, Transition
 from cdpr_rt.errors import ControlError
@@ -128,8 +128,11 @@ class CommandDispatcher:
             self._take(self._commands_taken, self._engine.block.take_command)
         elif self._deferred is not None and self._deferred.task.done:
             self._resume(self._deferred)
-        if self._reading is not None and self._reading[1].done:
-            self._answer_reading(*self._reading)
+        if self._reading is not None:
+            if self._engine.reacting is not Reaction.NONE:  # confirming that the power is off
+                self._engine.machine.clock.cancel(self._reading[1])  # may need the same drive
+            if self._reading[1].done:
+                self._answer_reading(*self._reading)
 
     def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
         try:
@@ -374,6 +377,8 @@ class CommandDispatcher:
         self._reading = None
         try:
             data = task.result()
+        except TaskCancelled:
+            self._reply(_number(command), f"object: cancelled: {self._occupied()}")
         except Exception as error:  # a drive may send anything
             self._reply(_number(command), str(error) or type(error).__name__)
         else:

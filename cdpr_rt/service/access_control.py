@@ -83,7 +83,14 @@ _LIVE_PATH = "/live"
 _DOWNLOADS: Final = "/recordings/"
 PROGRESS: Final = "cdpr_rt.progress"
 """Key of a scope: a number that grows while an answer is being made or sent."""
-_HEADERS = [(b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store")]
+_HEADERS: Final = {
+    b"content-security-policy": b"default-src 'none'; frame-ancestors 'none'",
+    b"cross-origin-resource-policy": b"same-origin",
+    b"referrer-policy": b"no-referrer",
+    b"x-content-type-options": b"nosniff",
+    b"cache-control": b"no-store",
+}
+"""Headers of every answer that does not have them."""
 
 
 class _RefusedError(Exception):
@@ -200,7 +207,8 @@ class AccessControl:
 
             async def send_on(message: Message) -> None:
                 if message["type"] == "http.response.start":
-                    message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
+                    headers = _HEADERS | dict(message.get("headers", ()))
+                    message = {**message, "headers": list(headers.items())}
                 await send(message)
                 note_progress(scope)
 
@@ -394,7 +402,7 @@ async def _answer(scope: Scope, send: Send, refused: _RefusedError) -> None:
     headers = [
         (b"content-type", b"application/json"),
         (b"content-length", str(len(body)).encode()),
-        *_HEADERS,
+        *_HEADERS.items(),
     ]
     if refused.status is HTTPStatus.UNAUTHORIZED:
         headers.append((b"www-authenticate", b"Bearer"))

@@ -22,7 +22,7 @@ from prometheus_client.core import (
 )
 from prometheus_client.registry import Collector
 from starlette.exceptions import HTTPException
-from starlette.responses import HTMLResponse, JSONResponse
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
@@ -47,6 +47,7 @@ from cdpr_rt.service.recording_routes import add_recordings
 from cdpr_rt.service.rows import newest_row
 from cdpr_rt.service.service import (
     DescribingError,
+    DriveTextsError,
     InjectionError,
     PlannerBusyError,
     Service,
@@ -271,6 +272,7 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     RecordingsBusyError: HTTPStatus.CONFLICT,
     ProcedureError: HTTPStatus.CONFLICT,
     DescribingError: HTTPStatus.CONFLICT,
+    DriveTextsError: HTTPStatus.CONFLICT,
 }
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
@@ -570,7 +572,7 @@ def _add_motion(app: FastAPI, service: Service) -> None:
 
 
 def _add_drives(app: FastAPI, service: Service) -> None:
-    @app.get("/drives")
+    @app.get("/drives", responses=_REFUSALS)
     async def drives() -> models.Drives:
         """What the drives report, as text, and the planned load of the buses."""
         texts, row = service.drives, newest_row(service.block)
@@ -644,11 +646,11 @@ def _add_procedures(app: FastAPI, service: Service) -> None:
 
     @app.get(REPORTS_PREFIX + "{secret}/{name:path}", include_in_schema=False)
     async def report(secret: str, name: str) -> Response:
-        found = await asyncio.to_thread(procedures.read, secret, name)
+        found = await asyncio.to_thread(procedures.find, secret, name)
         if found is None:
             raise HTTPException(404)
-        content, kind = found
-        return Response(content, headers={**REPORT_HEADERS, "content-type": kind})
+        path, kind = found
+        return FileResponse(path, headers={**REPORT_HEADERS, "content-type": kind})
 
 
 def _add_describing(app: FastAPI, service: Service) -> None:

@@ -507,6 +507,8 @@ class Control(_Answer):
     held: bool
     client: str | None
     left_s: float
+    procedure: str
+    """The client's procedure that moves the robot instead of the client; empty without one."""
 
 
 class LoopLife(_Answer):

@@ -29,10 +29,8 @@ REPORT_HEADERS: Final = {
         "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; sandbox; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     ),
-    "referrer-policy": "no-referrer",
 }
 """A report runs no scripts, and belongs to no origin."""
-_HEADERS: Final = {"content-security-policy": _POLICY, "referrer-policy": "no-referrer"}
 
 
 def add_page(app: FastAPI) -> None:
@@ -43,7 +41,9 @@ def add_page(app: FastAPI) -> None:
         if name not in built:
             raise HTTPException(404)
         kind = _KINDS[name[name.rindex(".") :]]
-        return Response(built[name], headers={**_HEADERS, "content-type": kind})
+        return Response(
+            built[name], headers={"content-security-policy": _POLICY, "content-type": kind}
+        )
 
     @app.get("/", include_in_schema=False)
     async def page() -> Response:

@@ -19,7 +19,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from cdpr_profiles.errors import brief, printable
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.errors import ControlError, RawLogError
 from cdpr_rt.identification.rawlog import map_raw_log
 from cdpr_rt.service.lease import Lease
@@ -34,7 +34,6 @@ _CUT_S: Final = 2.0
 """The same after an emergency stop."""
 _MOST_LINES, _MOST_STEPS, _MOST_CHARS = 200, 400, 400
 _LINE_BYTES: Final = 1 << 22
-_MOST_FILE_BYTES: Final = 1 << 26
 _KINDS: Final = {
     ".html": "text/html; charset=utf-8",
     ".png": "image/png",
@@ -67,6 +66,8 @@ class Procedure:
     """Title and path, within the folder, of each report that it may write."""
     takes_bus: bool = False
     """Whether it runs drives of the loop's buses, which the loop must release."""
+    moves: bool = False
+    """Whether it moves the robot through the loop; meanwhile its client cannot."""
     values: dict[str, Any] = field(default_factory=dict)
     """Further facts for the client."""
 
@@ -82,11 +83,14 @@ class ProcedureRunner:
     """Runs one procedure at a time; clients read `job()`.
 
     A procedure ends, as with Ctrl-C at a terminal, if it is cancelled, if anybody stops the robot,
-    or if its client loses the right to move. For one asyncio loop.
+    or if its client loses the right to move. `pid`, which outlives this process, has the process
+    that runs the drives of the loop's buses, or 0. For one asyncio loop.
     """
 
-    def __init__(self, lease: Lease, note: Callable[[str], None], buses: Buses) -> None:
-        self._lease, self._note, self._buses = lease, note, buses
+    def __init__(
+        self, lease: Lease, note: Callable[[str], None], buses: Buses, pid: IntArray
+    ) -> None:
+        self._lease, self._note, self._buses, self._pid = lease, note, buses, pid
         self.plan: Callable[[Any], Procedure] | None = None
         """Function that returns the procedure for a checked request; set by its owner.
 
@@ -97,7 +101,8 @@ class ProcedureRunner:
         self._number = 0
         self._running = False
         self._procedure: Procedure | None = None
-        self._client = self._kind = self._token = self._ending = self._error = ""
+        self._client = self._kind = self._ending = self._error = ""
+        self._token = self._lent = ""
         self._result: dict[str, Any] | None = None
         self._lines: deque[str] = deque(maxlen=_MOST_LINES)
         self._steps: list[dict[str, Any]] = []
@@ -148,6 +153,7 @@ class ProcedureRunner:
         self._ending, self._asked_s, self._cut_s = "", 0.0, 0.0
         try:
             procedure = await asyncio.to_thread(self.plan, request)
+            self._lent = self._lease.lend(token, procedure.what) if procedure.moves else ""
         except BaseException:
             self._running = False
             raise
@@ -173,7 +179,7 @@ class ProcedureRunner:
             return True
         self._asked_s = now_s
         self._ending = self._ending or why
-        self._interrupt()
+        self._signal(signal.SIGINT)
         return True
 
     def cut(self, why: str) -> None:
@@ -181,12 +187,33 @@ class ProcedureRunner:
         if self.end(why) and not self._cut_s:
             self._cut_s = time.monotonic()
 
-    def _interrupt(self) -> None:
-        if self._process is not None and self._process.returncode is None:
-            with suppress(ProcessLookupError):
-                self._process.send_signal(signal.SIGINT)
+    def recover(self) -> None:
+        """End the procedure of a service that was killed; then the loop takes its buses again."""
+        what = "procedure of a service that was killed"
+        self._running = True
+        self._procedure, self._kind = Procedure(what, (), "", Path(), takes_bus=True), "commission"
+        self._client = "the daemon"
+        self._number += 1
+        self._note(f"{what}: the loop takes the drives again when it has ended")
+        self._task = asyncio.create_task(self._run(self._procedure, int(self._pid[0])))
+        self.end("its service was killed")
 
-    def read(self, secret: str, name: str) -> tuple[bytes, str] | None:
+    def _signal(self, number: signal.Signals) -> None:
+        with suppress(OSError):
+            if self._process is not None and self._process.returncode is None:
+                self._process.send_signal(number)
+            elif self._leads_session(pid := int(self._pid[0])):
+                os.kill(pid, number)
+
+    @staticmethod
+    def _leads_session(pid: int) -> bool:
+        """Whether a process exists and leads a session, as procedures do."""
+        try:
+            return pid > 0 and os.getsid(pid) == pid
+        except OSError:
+            return False
+
+    def find(self, secret: str, name: str) -> tuple[Path, str] | None:
         """Return a file of a report and its type, or None if there is no such file to serve."""
         folder = self._folders.get(secret)
         kind = _KINDS.get(Path(name).suffix)
@@ -197,9 +224,7 @@ class ProcedureRunner:
             path = (whole / name).resolve(strict=True)
             if not path.is_relative_to(whole) or not path.is_file():
                 return None
-            if path.stat().st_size > _MOST_FILE_BYTES:
-                return None
-            return path.read_bytes(), kind
+            return path, kind
         except (OSError, ValueError):
             return None
 
@@ -239,26 +264,23 @@ class ProcedureRunner:
                 self.end("the daemon ends")
                 with suppress(TimeoutError, asyncio.CancelledError):
                     await asyncio.wait_for(asyncio.shield(self._task), _AGAIN_S)
-                self._kill()
+                self._signal(signal.SIGKILL)
 
     def _look(self) -> None:
         if not self._ending and not self._lease.is_held_by(self._token):
             self.end("its page no longer has the right to move")
         now_s = time.monotonic()
         if self._cut_s:
-            self._interrupt()  # the second interrupt removes the power
+            self._signal(signal.SIGINT)  # the second interrupt removes the power
         if now_s - (self._asked_s or now_s) > _END_S or now_s - (self._cut_s or now_s) > _CUT_S:
-            self._kill()
+            self._signal(signal.SIGKILL)
 
-    def _kill(self) -> None:
-        if self._process is not None and self._process.returncode is None:
-            with suppress(ProcessLookupError):
-                self._process.kill()
-
-    async def _run(self, procedure: Procedure) -> None:
-        released = False
+    async def _run(self, procedure: Procedure, orphan: int | None = None) -> None:
+        released = orphan is not None
         try:
-            if procedure.takes_bus:
+            while orphan and self._leads_session(orphan):
+                await asyncio.sleep(_LOOK_S)
+            if procedure.takes_bus and not released:
                 self._error = await self._buses(False)
                 released = not self._error
             for command in procedure.commands:
@@ -276,6 +298,7 @@ class ProcedureRunner:
                 self._error = f"ended: {self._ending}"
             self._process = None
             self._running = False
+            self._lease.end_loan()
             self._note(f"{procedure.what}: {self._error or 'done'}")
 
     async def _run_command(self, command: tuple[str, ...], variable: str) -> str:
@@ -286,10 +309,12 @@ class ProcedureRunner:
             stdin=asyncio.subprocess.PIPE,  # it ends with this pipe, even if this process dies
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
-            env={**os.environ, variable: self._token},
+            env={**os.environ, variable: self._lent or self._token},
             start_new_session=True,
             limit=_LINE_BYTES,
         )
+        if self._procedure is not None and self._procedure.takes_bus:
+            self._pid[0] = process.pid
         if self._ending:
             process.send_signal(signal.SIGINT)
         assert process.stdout is not None and process.stderr is not None
@@ -298,10 +323,11 @@ class ProcedureRunner:
                 _each_line(process.stdout, self._take), _each_line(process.stderr, self._say)
             )
         except BaseException:  # the buses are taken again: the command may not run on
-            self._kill()
+            self._signal(signal.SIGKILL)
             raise
         finally:
             status = await process.wait()
+            self._pid[0] = 0
         if self._result is None:
             return f"ended with status {status}, without a result"
         return str(self._result.get("error", ""))  # without it, a status of 1 is a verdict

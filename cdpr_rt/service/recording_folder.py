@@ -7,6 +7,7 @@ requested, so a request cannot name any other file.
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -21,7 +22,10 @@ from cdpr_rt.service.retention import recordings_of
 
 _PIECE_BYTES: Final = 1 << 17
 _MOST_READERS: Final = 2
-"""Largest number of recordings that are read at the same time."""
+"""Largest number of recordings that are read at the same time for curves, and for anything else.
+
+A slow download therefore blocks no plot.
+"""
 READING_S: Final = 600.0
 """Longest time for reading one of them."""
 _TOLD_S: Final = 1.0
@@ -44,7 +48,8 @@ class RecordingFolder:
         self._folder, self._robot = folder, file_name_of(robot)
         self._command = command
         self._spans: dict[tuple[str, int, float], tuple[int, int]] = {}
-        self._readers = 0
+        self._readers = Counter[bool]()
+        """Number of processes that read, for curves (True) and for anything else."""
 
     def find(self, name: str) -> Path | None:
         """Return the recording of this name, None if the list does not contain it."""
@@ -54,16 +59,16 @@ class RecordingFolder:
     def listed(self, live: str | None) -> list[dict[str, Any]]:
         """Return the recordings, newest first, as `models.Recording`; `live` is the open file."""
         found = sorted(recordings_of(self._folder, self._robot), key=lambda one: one[0].name)
-        spans, self._spans = self._spans, {}
+        spans: dict[tuple[str, int, float], tuple[int, int]] = {}
         listed = []
         for path, written_s, size in reversed(found):
             is_live = str(path) == live
             # the time of the last write shows how long the open file is, without reading it
             key = (path.name, 0, 0.0) if is_live else (path.name, size, written_s)
             with suppress(ProfileError, OSError, ValueError):  # removed meanwhile, or damaged
-                first_ns, last_ns = spans.get(key) or span_of(path)
+                first_ns, last_ns = self._spans.get(key) or span_of(path)
                 if first_ns:  # otherwise it contains nothing yet
-                    self._spans[key] = first_ns, last_ns
+                    spans[key] = first_ns, last_ns
                 last_ns = max(last_ns, int(written_s * 1e9)) if is_live else last_ns
                 first_ns = first_ns or last_ns or int(written_s * 1e9)
                 last_ns = max(first_ns, last_ns)
@@ -72,6 +77,7 @@ class RecordingFolder:
                 session, _, part = path.stem.rpartition("-")
                 listed.append({"name": path.name, "session": session, "part": int(part), **one})
                 listed[-1]["live"] = is_live
+        self._spans = spans  # at the end, because several threads may list at the same time
         return listed
 
     async def read(
@@ -82,11 +88,11 @@ class RecordingFolder:
         Until it comes, `waiting` is awaited every second; its exception ends the process.
         Raises RecordingsBusyError, and ValueError with its reason if it fails before any output.
         """
-        if self._readers >= _MOST_READERS:
+        if self._readers[curves := arguments[0] == "columns"] >= _MOST_READERS:
             raise RecordingsBusyError(
                 f"{_MOST_READERS} recordings are already being read; try again later"
             )
-        self._readers += 1
+        self._readers[curves] += 1
         process = None
         try:
             process = await asyncio.create_subprocess_exec(
@@ -97,7 +103,7 @@ class RecordingFolder:
                 async for piece in _pieces_of(process, waiting):
                     yield piece
         finally:
-            self._readers -= 1
+            self._readers[curves] -= 1
             if process is not None and process.returncode is None:
                 process.kill()
 

@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -107,6 +107,7 @@ class WorkspaceBorder:
             self._found = asyncio.create_task(self._compute(self.work()))
         found = await asyncio.shield(self._found)
         if error := found.get("error"):
+            self._found = None  # the next request tries again
             raise PlannerBusyError(str(error))
         return found
 
@@ -157,8 +158,15 @@ class InjectionError(ControlError):
     """A fault could not be injected into a simulated drive."""
 
 
+class DriveTextsError(ControlError):
+    """What drives report cannot be explained; the message gives the reason."""
+
+
 class DriveTexts(Protocol):
-    """Explains what drives report; the first call may take a second."""
+    """Explains what drives report; the first call may take a second.
+
+    Each method raises DriveTextsError if the robot's file cannot be read.
+    """
 
     def drives(self, statuswords: Sequence[int]) -> list[dict[str, Any]]:
         """Return for each axis what its statusword means, as `models.Drive`."""
@@ -193,8 +201,9 @@ class Service:
         self.planner = PathPlanRunner()
         """Plans paths in a separate process."""
         self.procedures = ProcedureRunner(
-            self.lease, lambda text: self.events.add("procedure", text), self._pass_buses
-        )
+            self.lease, lambda text: self.events.add("procedure", text), self._pass_buses,
+            block.counters["procedure_pid"],
+        )  # fmt: skip
         """Runs commissioning and calibration in a separate process."""
         self.border = WorkspaceBorder()
         self.stream: SetpointStream | None = None
@@ -285,7 +294,7 @@ class Service:
         The right expires if the client has `gone` during that time. Raises LeaseError and the
         errors of `LoopLink.command`.
         """
-        right = self.lease.renew(token).number
+        right = self.lease.renew(token, moves=True).number
         keeping = asyncio.create_task(self._keep_right(token, gone))
         try:
             # begun here, so that the client's next request comes after this command
@@ -327,7 +336,8 @@ class Service:
         if do == "set" and reply.ok:
             self._note_set(client, fields["wanted"])
         elif do != "object":
-            self.events.add("command", f"{do} by {client}{result}")
+            what = fields["program"] if do == "program" else do
+            self.events.add("command", f"{what} by {client}{result}")
         elif fields["value"] is not None:
             what = "axis {axis}, {index:04X}h:{sub} to {value}".format(**fields)
             self.events.add("command", f"object of {what} by {client}{result}")
@@ -379,6 +389,7 @@ class Service:
             "lockstep": False,
             "notices": [],
             **of_loop,
+            "released": self.procedures.has_bus and bool(of_loop.get("released")),
             "robot": self.robot,
             "state": link.state(),
             "reason": link.ended_how or str(of_loop.get("reason", "")),
@@ -397,8 +408,8 @@ class Service:
         """Return the holder of the right to move."""
         holder = self.lease.holder()
         if holder is None:
-            return {"held": False, "client": None, "left_s": 0.0}
-        return {"held": True, "client": holder.client, "left_s": holder.left_s}
+            return {"held": False, "client": None, "left_s": 0.0, "procedure": ""}
+        return {"held": True, **asdict(holder)}
 
     def part_figures(self) -> dict[str, dict[str, Any]]:
         """Return the status values of each part, and of the service itself."""
@@ -416,6 +427,8 @@ class Service:
 
     async def watch(self) -> None:
         """Follow the loop and the holder of the right to move, until cancelled."""
+        if self.link.status().get("released"):
+            self.procedures.recover()
         async with asyncio.TaskGroup() as tasks:
             for work in (
                 self.link.watch, self._watch_holder, self.procedures.watch, *self.background

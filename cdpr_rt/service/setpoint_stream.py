@@ -150,10 +150,10 @@ class StreamSessionManager:
     def issue(self, token: str | None) -> StreamSession:
         """Give the holder of the right to move a session, in place of any other.
 
-        Raises LeaseError if `token` is not the holder's.
+        Raises LeaseError if `token` is not the holder's, or if its procedure moves the robot.
         """
         with self._lock:
-            right = self._lease.renew(token).number
+            right = self._lease.renew(token, moves=True).number
             given = StreamSession(secrets.randbelow((1 << 32) - 1) + 1, secrets.token_bytes(32))
             self._begin(_Session(given.number, given.key, token or "", right, given=True))
             return given

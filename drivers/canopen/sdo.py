@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Final, NoReturn
 
 from cdpr_drivers.errors import BusError, SdoAbortError, SdoCancelledError, SdoTimeoutError
-from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.clock import Clock, TaskCancelled
 
 # Frames of SDO transfers (CiA 301), built and matched by a client; no waiting.
 
@@ -244,7 +244,11 @@ class SdoClient:
         with self._exclusive():
             self._object, self._multiplexer = (index, sub), multiplexer(index, sub)
             self._timeout_s = timeout_s
-            yield
+            try:
+                yield
+            except TaskCancelled:
+                self._send_abort(GENERAL)
+                raise
 
     def _initiate(self, command: int, data: bytes, *kinds: int) -> bytes:
         request = request_frame(command, *self._object, data)

@@ -7,7 +7,9 @@ from functools import cached_property
 from typing import Any
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.robot import RobotAxis
+from cdpr_rt.service.service import DriveTextsError
 
 
 class RobotDriveTexts:
@@ -21,7 +23,12 @@ class RobotDriveTexts:
 
     @cached_property
     def _robot(self) -> Robot:
-        return load_robot(self._path)
+        try:
+            return load_robot(self._path)
+        except ProfileError as error:
+            raise DriveTextsError(
+                f"{error}; the robot runs with the file of its start: correct it"
+            ) from None
 
     def drives(self, statuswords: Sequence[int]) -> list[dict[str, Any]]:
         """Return for each axis what its statusword means, as `models.Drive`."""
@@ -45,6 +52,10 @@ class RobotDriveTexts:
         """Return the meaning of an object's data, as `models.DriveObject`."""
         from cdpr_drivers.decode.values import NodeView, ObjectNames, read_field  # noqa: PLC0415
 
+        if axis >= len(self._robot.axes):
+            raise DriveTextsError(
+                f"{self._path}: has no axis {axis} any more: start the robot again"
+            )
         of = self._robot.axes[axis]
         winch = of.winch
         view = NodeView(of.node_id, ObjectNames(winch.drive.eds), winch.drive)

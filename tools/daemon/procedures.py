@@ -77,13 +77,14 @@ class _Plans:
         out: Path,
         reports: tuple[tuple[str, str], ...] = (),
         takes_bus: bool = False,
+        moves: bool = False,
         real_time: bool = False,
         **values: Any,
     ) -> Procedure:
         if self.settings.simulated or not real_time:
             commands = tuple((*_NICE, *command) for command in commands)
         values |= {"folder": str(out), "robot": self.robot.reference}
-        return Procedure(what, commands, PROCEDURE_VARIABLE, out, reports, takes_bus, values)
+        return Procedure(what, commands, PROCEDURE_VARIABLE, out, reports, takes_bus, moves, values)
 
     def _buses(self) -> tuple[str, ...]:
         """Return the options for the loop's drives; simulated ones carry cables there, so for a
@@ -143,7 +144,7 @@ class _Plans:
             "--dry-run", *words,
         )  # fmt: skip
         return self._procedure(
-            "measurement of poses", command, out=out, reports=_REPORTS, measurement=name
+            "measurement of poses", command, out=out, reports=_REPORTS, moves=True, measurement=name
         )
 
     def _camera(self) -> list[str]:
@@ -176,7 +177,7 @@ class _Plans:
             "calibrate", "check", self.robot.reference, "--running",
             f"--socket={self.settings.socket}", f"--out={out}",
         )  # fmt: skip
-        return self._procedure("check of the calibration", command, out=out)
+        return self._procedure("check of the calibration", command, out=out, moves=True)
 
     def _undo(self, _request: models.UndoCalibration) -> Procedure:
         command = _command("calibrate", "undo", self.robot.reference)

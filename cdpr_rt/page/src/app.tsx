@@ -23,6 +23,7 @@ function Header() {
   const { status, description, right, connected } = useStore();
   const { tone, title } = useSituation();
   const factor = (status as { real_time_factor?: number | null } | null)?.real_time_factor;
+  const procedure = status?.control.procedure ? `, lent to the ${status.control.procedure}` : "";
   const holder = right.held ? "You have the right to move" : status?.control.held ? `${status.control.client} has the right to move` : "";
   return (
     <header>
@@ -32,7 +33,7 @@ function Header() {
         <span class="facts">
           {description && <span>{description.simulated ? "simulated" : "real drives"}</span>}
           {connected && factor != null && factor < SLOW && <span>runs at {factor.toFixed(2)} of real time</span>}
-          {holder && <span>{holder}</span>}
+          {holder && <span>{holder}{procedure}</span>}
         </span>
       </div>
       <span class={`pill ${tone}`}>{title.length > 40 ? `${title.slice(0, 38)}…` : title}</span>

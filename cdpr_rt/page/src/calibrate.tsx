@@ -9,6 +9,11 @@ import { useStore } from "./store";
 
 const PARTS = { geometry: "Geometry", tension: "Winch tension", lens: "Camera lens" };
 type Part = keyof typeof PARTS;
+const PURPOSES: Record<Part, string> = {
+  geometry: "Exit points, anchor points and drums never have exactly the measures of the robot's file. Calibration finds their errors from the cable lengths at many poses, so that the platform goes where it is sent.",
+  tension: "A motor's torque shows the tension of its cable only as well as radius and friction of the winch are known. Known masses measure both.",
+  lens: "A camera on the platform sees markers on the floor or the walls and so measures poses, which cable lengths alone cannot. Its lens must be known first.",
+};
 const OF_PART: Record<Part, string[]> = { geometry: ["measure", "adopt", "check", "undo"], tension: ["tension"], lens: ["lens"] };
 
 interface Props { job: Job | null; start: (wanted: Wanted) => Promise<void> }
@@ -36,6 +41,7 @@ export function Calibrate() {
           {mine && <Progress job={mine} />}
           {mine?.running && mine.procedure !== "undo" && part === "geometry" && <RobotView />}
           {mine && !mine.running && mine.result && <Results job={mine} start={start} />}
+          {!mine && <section class="card"><h2>What it is for</h2><p>{PURPOSES[part]}</p></section>}
         </div>
       </div>
     </>

@@ -176,7 +176,7 @@ export class Right {
   /** The same, and stop on the connection on which the other steps were sent, after them. */
   stop(): void {
     this.cancel();
-    this.#socket?.send(JSON.stringify({ do: "hold", client: clientName() }));
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify({ do: "hold", client: clientName() }));
   }
 
   /** Take the right for a step; throws `Rejected` with the holder's name, or if the step came too late or was stopped. */
@@ -211,7 +211,7 @@ export class Right {
     });
     const renewing = setInterval(() => {
       if (this.#socket !== socket) clearInterval(renewing);
-      else socket.send(JSON.stringify({ do: "renew" }));
+      else if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ do: "renew" }));
     }, RENEW_MS);
   }
 

@@ -1,6 +1,7 @@
 // Drives and bus: states and errors as text, objects, timing, events.
 import { useEffect, useState } from "preact/hooks";
 import { type DriveObject, type Drives as DrivesAnswer, type Status, clientName, request } from "./daemon";
+import { EventLine } from "./look";
 import { store, useStore } from "./store";
 import "./data.css";
 
@@ -20,14 +21,16 @@ const number = (value: unknown, digits: number): string => (typeof value === "nu
 export function Drives() {
   const { status } = useStore();
   const [found, setFound] = useState<DrivesAnswer | null>(null);
+  const [why, setWhy] = useState("");
   const [axis, setAxis] = useState(0);
   useEffect(() => {
     const look = async (): Promise<void> => {
       if (document.visibilityState !== "visible") return;
       try {
         setFound(await request<DrivesAnswer>("GET", "/drives"));
-      } catch {
-        // the header shows that the daemon does not answer
+        setWhy("");
+      } catch (error) {
+        setWhy((error as Error).message);
       }
     };
     void look();
@@ -38,7 +41,7 @@ export function Drives() {
   return (
     <div class="columns drives-first">
       <div class="column wide">
-        <DriveTable drives={found?.drives ?? []} status={status} axis={axis} choose={setAxis} />
+        <DriveTable why={why} drives={found?.drives ?? []} status={status} axis={axis} choose={setAxis} />
         {drive && <StatusBits drive={drive} />}
         {drive && <Objects key={axis} axis={axis} drive={drive} status={status} />}
       </div>
@@ -51,13 +54,13 @@ export function Drives() {
   );
 }
 
-function DriveTable({ drives, status, axis, choose }: { drives: Drive[]; status: Status | null; axis: number; choose(axis: number): void }) {
+function DriveTable({ why, drives, status, axis, choose }: { why: string; drives: Drive[]; status: Status | null; axis: number; choose(axis: number): void }) {
   const ages = (status as LoopFigures | null)?.count?.heartbeat_age_s ?? [];
   const faults = (status?.faults ?? []) as unknown as Fault[];
   return (
     <section class="card" aria-labelledby="drive-states">
       <h2 id="drive-states">Drives</h2>
-      {!drives.length && <p class="quiet">No drive has answered yet.</p>}
+      {why ? <p class="fault">{why}</p> : !drives.length && <p class="quiet">No drive has answered yet.</p>}
       <ul class="drives">
         {drives.map((one, place) => {
           const values = status?.axes[place] ?? {};
@@ -205,7 +208,7 @@ function Timing({ status }: { status: Status | null }) {
   return (
     <section class="card" aria-labelledby="timing">
       <h2 id="timing">Timing of the cycles</h2>
-      <dl class="figures">{rows.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
+      <dl class="pairs">{rows.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
     </section>
   );
 }
@@ -223,9 +226,7 @@ function EventList({ names }: { names: string[] }) {
       </select></label></div>
       {shown.length === 0 && <p class="quiet">No event{axis && ` names ${axis}`}.</p>}
       <ol class="events" tabIndex={0} aria-labelledby="events">
-        {shown.map((one) => (
-          <li key={one.number} class={one.kind === "reason" ? "reason" : ""}><time>{one.time.slice(0, 10)} {one.time.slice(11, 23)}</time> {one.text}{one.times > 1 ? ` (${one.times} times)` : ""}</li>
-        ))}
+        {shown.map((one) => <EventLine key={one.number} event={one} exact />)}
       </ol>
     </section>
   );

@@ -1,7 +1,7 @@
 // What is only looked at: the robot, tensions, curves, events, axes.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
-import { type Border, type Cycle, type Description, hasKey, request } from "./daemon";
+import { type Border, type Cycle, type DaemonEvent, type Description, hasKey, request } from "./daemon";
 import { anglesOf, go, positionsOf, presentPose, rounded, targetOf, useHindrance } from "./move";
 import { RobotScene, tensionColour } from "./scene";
 import { progressOf } from "./situation";
@@ -177,6 +177,20 @@ function TrendView({ title, curves, values, floor }: { title: string; curves: Cu
   );
 }
 
+const STATES: Record<string, string> = {
+  starting: "the control loop starts", unconfigured: "drives not booted", inactive: "drives booted, not checked",
+  ready: "drives ready, no power", active: "power on", fault: "fault: the power is off", dead: "the control loop has ended",
+};
+
+/** One event; with its date and milliseconds if `exact`. */
+export function EventLine({ event: { kind, time, text, times }, exact = false }: { event: DaemonEvent; exact?: boolean }) {
+  return (
+    <li class={kind === "reason" ? "reason" : ""}>
+      <time>{exact ? time.slice(0, 23).replace("T", " ") : time.slice(11, 19)}</time> {kind === "state" ? STATES[text] ?? text : text}{times > 1 ? ` (${times} times)` : ""}
+    </li>
+  );
+}
+
 export function Events() {
   const { events } = useStore();
   return (
@@ -184,11 +198,7 @@ export function Events() {
       <h2 id="events">Events</h2>
       {events.length === 0 && <p class="quiet">Nothing has happened since this page was opened.</p>}
       <ol class="events" tabIndex={0} aria-labelledby="events">
-        {events.map((one) => (
-          <li key={one.number} class={one.kind === "reason" ? "reason" : ""}>
-            <time>{one.time.slice(11, 19)}</time> {one.text}{one.times > 1 ? ` (${one.times} times)` : ""}
-          </li>
-        ))}
+        {events.map((one) => <EventLine key={one.number} event={one} />)}
       </ol>
     </section>
   );

@@ -17,6 +17,7 @@ export const anglesOf = (platform: Platform): string[] => platform.controlled.fi
 export function useHindrance(): string {
   const { status, right } = useStore();
   if (status?.state !== "active" || progressOf(status).tight === false) return "The platform can move once the power is on and the cables are tight.";
+  if (status.control.procedure) return `The ${status.control.procedure} moves the platform.`;
   return status.control.held && !right.held ? `${status.control.client} has the right to move.` : "";
 }
 

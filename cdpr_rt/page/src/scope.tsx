@@ -131,7 +131,7 @@ function useLive(on: boolean, ids: string, curves: ScopeCurve[], trigger: Trigge
       if (paused || now - drawn < DRAW_MS) return;
       drawn = now;
       const window = made.window(trigger, span_s);
-      setText(trigger.mode === "off" ? "" : window ? `Triggered at ${made.triggered_s!.toFixed(3)} s` : "Waiting for the trigger");
+      setText(made.refused ? `${made.refused}.` : trigger.mode === "off" ? "" : window ? `Triggered at ${made.triggered_s!.toFixed(3)} s` : "Waiting for the trigger");
       if (!window) return;
       setShown({ samples: between(made.samples, ...window), window });
       const newest = made.samples.time_s[made.samples.time_s.length - 1]!;
@@ -337,7 +337,7 @@ function StepResponse({ samples, curves }: { samples: Samples; curves: ScopeCurv
       <h3>Step response</h3>
       <div class="row"><label>Curve <select value={curve?.id} onChange={(event) => setId(event.currentTarget.value)}>{curves.map(({ id, label }) => <option key={id} value={id}>{label}</option>)}</select></label></div>
       {found
-        ? <dl class="figures">{rows.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
+        ? <dl class="pairs">{rows.map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}</dl>
         : <p class="quiet note">No step between the cursors. Place A where the step begins, and B where the value has settled.</p>}
     </div>
   );

@@ -88,6 +88,8 @@ export class LiveFeed {
   samples: Samples;
   /** The time of the trigger whose window is shown, null without one. */
   triggered_s: number | null = null;
+  /** Why the daemon sends nothing; "" if it does. */
+  refused = "";
   #seen_s = -Infinity;
   #before: number | null = null;
   #socket: WebSocket | null = null;
@@ -114,7 +116,11 @@ export class LiveFeed {
         if (this.#ended) socket.close();
         await new Promise<void>((ended) => {
           socket.onmessage = ({ data }) => this.#take(JSON.parse(data as string));
-          socket.onclose = () => ended();
+          socket.onclose = ({ reason }) => {
+            this.refused = reason;
+            this.arrived();
+            ended();
+          };
         });
       } catch {
         // the daemon is away; tried again below
@@ -125,6 +131,7 @@ export class LiveFeed {
 
   #take(message: { kind: string; rows?: Record<string, number | null | (number | null)[]>[] }): void {
     if (message.kind !== "cycles" || this.#ended) return; // the next feed shares the times
+    this.refused = "";
     const { time_s, values } = this.samples;
     for (const row of message.rows!) {
       const at_s = row["time_s"] as number;

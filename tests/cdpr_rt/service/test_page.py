@@ -42,6 +42,25 @@ def test_the_page_may_run_no_foreign_and_no_inline_script(url: str) -> None:
     assert re.findall(r"<script(?![^>]*\bsrc=)|<style|\bon\w+=|https?://", page) == []
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/status", 200), ("GET", "/description", 401), ("GET", "/page/nothing", 404),
+        ("GET", "/reports/guess/report.html", 404), ("PATCH", "/status", 405),
+        ("POST", "/hold", 422),
+    ],
+)  # fmt: skip
+def test_every_answer_forbids_scripts_frames_and_other_origins(
+    rig: Rig, method: str, path: str, status: int
+) -> None:
+    headers = RIGHT if status in (405, 422) else {}
+    answer = httpx.request(method, rig.guarded_url + path, json={"client": ""}, headers=headers)
+    assert answer.status_code == status
+    assert answer.headers["content-security-policy"].startswith("default-src 'none'")
+    assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+    assert answer.headers["referrer-policy"] == "no-referrer"
+
+
 def test_the_built_page_is_small_and_has_its_licences() -> None:
     files = list(BUILT.iterdir())
     assert sum(file.stat().st_size for file in files) < 1.5e6

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_rt.service.service import PathPlanRunner, PlannerBusyError
+from cdpr_rt.service.service import PathPlanRunner, PlannerBusyError, WorkspaceBorder
 
 WANTED = {"name": "part.nc", "text": "M2\n"}
 
@@ -52,6 +52,22 @@ def test_a_stop_during_planning_discards_the_plan():
     job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}), "hold by somebody")
     assert job["plan"] is None
     assert job["error"] == "not started: hold by somebody during planning"
+
+
+def test_a_workspace_that_could_not_be_computed_is_computed_again():
+    answers = [(1, json.dumps({"error": "no memory"})), (0, json.dumps({"edges": [1]}))]
+
+    async def work() -> tuple[int, str]:
+        return answers.pop(0)
+
+    async def go() -> None:
+        border = WorkspaceBorder()
+        border.work = work
+        with pytest.raises(PlannerBusyError, match="no memory"):
+            await border.get()
+        assert await border.get() == await border.get() == {"edges": [1]}
+
+    asyncio.run(go())
 
 
 def test_planning_without_a_robot_is_rejected():

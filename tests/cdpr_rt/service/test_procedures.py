@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
 import struct
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -15,7 +17,10 @@ from typing import Any
 import httpx
 import pytest
 
-from cdpr_rt.service.procedure_runner import Procedure, ProcedureError
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.loop.right import PublishedRight
+from cdpr_rt.service.lease import Lease
+from cdpr_rt.service.procedure_runner import Procedure, ProcedureError, ProcedureRunner
 from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
@@ -128,6 +133,12 @@ def test_nobody_boots_the_drives_that_a_procedure_runs(rig: Rig, folder: Path) -
         assert (answer.status_code, job(rig)["running"]) == (409, True)
         assert "a procedure runs the drives" in answer.json()["error"]
         assert [one["do"] for one in rig.loop.commands] == ["release"]
+        rig.loop.publish(released=True)
+        wait_for(lambda: rig.service.status()["released"])
+        rig.service.procedures.cut("emergency stop")
+        wait_for(lambda: not job(rig)["running"])
+        assert not rig.service.status()["released"]  # anybody may boot the drives now
+        rig.loop.publish(released=False)
 
 
 def test_a_dead_service_takes_its_procedure_with_it(rig: Rig, folder: Path) -> None:
@@ -139,6 +150,76 @@ def test_a_dead_service_takes_its_procedure_with_it(rig: Rig, folder: Path) -> N
         process.stdin.close()  # as the kernel does
         wait_for(lambda: not job(rig)["running"])
     assert job(rig)["result"] == {"ok": False, "stops": [2]}
+
+
+@pytest.mark.parametrize("how", ["is interrupted", "hangs"])
+def test_a_restarted_service_ends_the_procedure_before_the_loop_takes_its_buses(how: str) -> None:
+    asyncio.run(_recover(how))
+
+
+async def _recover(how: str) -> None:
+    ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN);" * (how == "hangs")
+    text = f"import signal, time; {ignore} print(flush=True); time.sleep(600)"
+    command = (sys.executable, "-c", text)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True) as orphan:
+        assert orphan.stdout is not None
+        orphan.stdout.read(1)
+        block = SharedBlock.create(1, 0.1, 100.0)
+        block.counters["procedure_pid"] = orphan.pid
+        alive_when_taken: list[bool] = []
+
+        async def buses(take: bool) -> str:
+            alive_when_taken.append(orphan.poll() is None)
+            return "" if take else "only taken"
+
+        pid = block.counters["procedure_pid"]
+        runner = ProcedureRunner(Lease(PublishedRight(block)), lambda _: None, buses, pid)
+        runner.recover()
+        watching = asyncio.create_task(runner.watch())
+        assert runner.has_bus
+        if how == "hangs":
+            runner.cut("emergency stop")
+        while runner.has_bus:
+            orphan.poll()  # the launcher's init does this
+            await asyncio.sleep(0.01)
+        watching.cancel()
+        assert alive_when_taken == ([] if how == "hangs" else [False])
+        assert orphan.poll() is not None
+        assert runner.job()["error"] == "ended: its service was killed"
+
+
+MOVES = """
+import os, sys
+print(os.environ["TOKEN"], file=sys.stderr, flush=True)
+sys.stdin.read()
+"""
+
+
+def test_while_a_procedure_moves_the_robot_its_client_cannot(rig: Rig, tmp_path: Path) -> None:
+    command = (sys.executable, "-c", MOVES)
+    rig.service.procedures.plan = lambda _: Procedure(
+        "measurement of poses", (command,), "TOKEN", tmp_path, moves=True
+    )
+
+    def jog(token: dict[str, str]) -> httpx.Response:
+        body = {"program": "jog", "wanted": {}}
+        return httpx.post(f"{rig.guarded_url}/program", json=body, headers={**RIGHT, **token})
+
+    with in_control(rig) as token:
+        assert ask(rig, COMMISSION, **token).status_code == 200
+        wait_for(lambda: job(rig)["lines"])
+        assert "measurement of poses moves the robot" in jog(token).json()["error"]
+        lent = {"X-Control-Token": job(rig)["lines"][0]}
+        assert jog(lent).status_code == 200
+        control = httpx.get(f"{rig.guarded_url}/control", headers=RIGHT).json()
+        assert (control["client"], control["procedure"]) == ("maria", "measurement of poses")
+        url = f"{rig.guarded_url}/control"
+        assert httpx.put(url, headers={**RIGHT, **token}).status_code == 200
+        httpx.delete(f"{rig.guarded_url}/procedure", headers=RIGHT)
+        wait_for(lambda: not job(rig)["running"])
+        assert jog(lent).status_code == 409
+        assert jog(token).status_code == 200
+    rig.service.procedures.plan = None
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from http.client import HTTPConnection
 from pathlib import Path
 
@@ -24,6 +24,9 @@ from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
 ROBOT = "bench"
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 READING = (sys.executable, "-P", "-m", "cdpr_tools.recordings.reading_process")
+SLOW_TABLES = (
+    sys.executable, "-c", "import sys, time; sys.argv[1] == 'columns' or time.sleep(60); print({})",
+)  # fmt: skip
 SLOW = (sys.executable, "-c", "import time; time.sleep(60)")
 
 
@@ -176,12 +179,22 @@ def test_slow_reading_delays_nothing_and_ends_with_its_client(
         began_s = time.monotonic()
         assert http.get("/status").status_code == 200
         assert time.monotonic() - began_s < 1.0
-    wait_for(lambda: recordings._readers == 0, 20.0)
+    wait_for(lambda: recordings._readers.total() == 0, 20.0)
 
 
-def test_two_recordings_are_read_at_a_time(rig: Rig, http: httpx.Client, folder: Path) -> None:
-    recordings = rig.service.recordings = RecordingFolder(folder, ROBOT, READING)
-    recordings._readers = 2
-    answer = http.get(f"/recordings/{names(http)[0]}/table.csv")
-    assert answer.status_code == 409
-    assert "already being read" in answer.json()["error"]
+def test_two_recordings_are_downloaded_at_a_time_and_block_no_curves(
+    rig: Rig, http: httpx.Client, folder: Path
+) -> None:
+    rig.service.recordings = RecordingFolder(folder, ROBOT, SLOW_TABLES)
+    path = f"/recordings/{names(http)[0]}"
+    with ExitStack() as waiting:
+        for _ in range(2):
+            connection = HTTPConnection("127.0.0.1", rig.guarded_port)
+            waiting.enter_context(closing(connection))
+            connection.request("GET", f"{path}/table.csv", headers=RIGHT)
+        readers = rig.service.recordings._readers
+        wait_for(lambda: readers.total() == 2)
+        answer = http.get(f"{path}/table.csv")
+        assert answer.status_code == 409
+        assert "already being read" in answer.json()["error"]
+        assert http.get(f"{path}/columns").status_code == 200

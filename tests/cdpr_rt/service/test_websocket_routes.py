@@ -184,6 +184,18 @@ def test_one_address_may_watch_with_many_pages_up_to_a_limit(rig: Rig) -> None:
     wait_for(lambda: rig.service.counts["live_clients"] == 0)
 
 
+def test_few_viewers_may_watch_every_cycle(rig: Rig) -> None:
+    path = "/live?all_cycles=true&fields=cycle"
+    with ExitStack() as watching:
+        for _ in range(websocket_routes._MOST_ALL_CYCLES):
+            watching.enter_context(open_unix(rig, path)).recv(60.0)
+        with open_unix(rig, path) as connection:
+            code, why = closed_for(connection)
+            assert (code, "every cycle" in why) == (control_socket.BUSY, True)
+        watching.enter_context(open_unix(rig, "/live")).recv(60.0)
+    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+
+
 # -- moving
 
 

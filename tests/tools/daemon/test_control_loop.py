@@ -228,6 +228,25 @@ def test_released_buses_are_closed_and_an_emergency_stop_is_then_only_reported(
     assert not ready.status["released"]
 
 
+def test_a_stop_cancels_the_reading_of_an_object(ready: LoopRig) -> None:
+    ready.obeyed("enable")
+    reading = {"do": "object", "client": "test", "axis": 0, "index": 0x1008, "sub": 0}
+    number = ready.block.post_command(reading)
+    ready.turn(1)
+    ready.block.post_urgent({"do": "disable", "client": "test"})
+    replies: dict[int, str] = {}
+
+    def both_answered() -> bool:
+        if (reply := ready.block.take_reply()) is not None:
+            replies[reply["to"]] = reply["text"]
+        return len(replies) == 2
+
+    ready.turn_until(both_answered)
+    assert replies.pop(number).startswith("object: cancelled: the robot is stopping")
+    assert list(replies.values()) == [""]
+    assert ready.command("object", **{key: reading[key] for key in ("axis", "index", "sub")})["ok"]
+
+
 def test_objects_are_read_with_power_and_written_without_but_never_a_controlword(
     ready: LoopRig,
 ) -> None:
