@@ -71,10 +71,10 @@ class Cycle:
         self.device.sync()
         return self.device.receive()
 
-    def transmit(self) -> None:
-        """Send the command, and close the cycle."""
+    def transmit(self, and_sync: bool = False) -> None:
+        """Send the command, and close the cycle; see `AxisDevice.transmit`."""
         device = self.device
-        device.transmit()
+        device.transmit(and_sync)
         if not device.lockstep:
             self._free_s = device.clock.now_s + device.commands_s
 

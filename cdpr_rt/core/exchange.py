@@ -87,14 +87,11 @@ class AxisDevice(Protocol):
     def receive(self) -> int:
         """Wait for the answers, decode them into `feedback`; return how many axes answered."""
 
-    def transmit(self) -> None:
-        """Encode `command` and send it, to act from the next SYNC on."""
+    def transmit(self, and_sync: bool = False) -> None:
+        """Encode `command` and send it, to act from the next SYNC on.
 
-    def sync_ahead(self) -> None:
-        """Send the next cycle's SYNC after `transmit`, so that the drives work while the row is
-        written.
-
-        Call it only in lockstep, and only if nothing else is sent before that cycle's `sync`.
+        With `and_sync` that SYNC follows now, so that the drives work while the row is written. Set
+        it only in lockstep, and only if nothing else is sent before the next cycle's `sync`.
         """
 
     def faults(self) -> Sequence[Fault]:

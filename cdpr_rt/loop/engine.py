@@ -432,9 +432,7 @@ class Engine:
         if machine.clock.now_s - came_s > _TOO_OLD_S:
             torque[:] = 0.0  # the process was suspended, and its drives stopped in the meantime
         try:
-            cycle.transmit()
-            if is_quiet is not None and is_quiet():
-                device.sync_ahead()
+            cycle.transmit(and_sync=is_quiet is not None and is_quiet())
         except machine.failures as error:
             self.lost_bus = Fault(Limit.DRIVE, code=BUS_LOST, detail=str(error))
         sent_ns = time.monotonic_ns()

@@ -131,11 +131,6 @@ class AxisBuses:
             except BusError as error:
                 self._mark_failed(i, error)
 
-    def sync_ahead(self) -> None:
-        """Send the SYNC of the next cycle now, see `AxisGroup.sync_ahead`."""
-        for group in self.groups:
-            group.sync_ahead()
-
     def receive(self) -> int:
         """Wait for the answers on all buses and decode them; return how many axes answered."""
         if self._single_group is not None and self.lockstep:
@@ -176,10 +171,13 @@ class AxisBuses:
         for flags in (feedback.valid, feedback.alive, feedback.rate_ok):
             flags.fill(False)
 
-    def transmit(self) -> None:
-        """Send controlwords and torques on all buses, to act from the next SYNC on."""
+    def transmit(self, and_sync: bool = False) -> None:
+        """Send controlwords and torques on all buses, to act from the next SYNC on.
+
+        With `and_sync` send the SYNC of the next cycle too, see `AxisGroup.transmit`.
+        """
         if self._single_group is not None:
-            self._single_group.transmit()
+            self._single_group.transmit(and_sync)
             self.transmits += 1
             return
         if self._reordering.needed:
@@ -195,6 +193,9 @@ class AxisBuses:
         if failure is not None:
             raise failure
         self.transmits += 1
+        if and_sync:  # only now: drives of all buses share their physics
+            for group in self.groups:
+                group.sync_ahead()
 
     def faults(self) -> tuple[Fault, ...]:
         """Return why the drives of all buses must be stopped, in the order of the buses."""

@@ -338,20 +338,28 @@ class AxisGroup:
             for k in others[1 : others[0] + 1]:
                 self.network.take_frame(rows[k])
 
-    def transmit(self) -> None:
+    def transmit(self, and_sync: bool = False) -> None:
         """Send controlwords and torques, to act from the next SYNC on.
 
-        A torque that is not a finite number is sent as zero and raises the alarm.
+        With `and_sync` send that SYNC too, see `sync_ahead`. A torque that is not a finite number
+        is sent as zero and raises the alarm.
         """
         self._alarms = self._encode()
+        now_s = self.feedback.time_s if self.lockstep else self.clock.now_s
+        heartbeat = now_s >= self._heartbeat_at_s
         try:
+            if and_sync and not heartbeat:
+                self._commands.send(self._sync_frame)
+                self._synced_ahead = True
+                return
             self._commands.send()
-            now_s = self.feedback.time_s if self.lockstep else self.clock.now_s
-            if now_s >= self._heartbeat_at_s:
+            if heartbeat:
                 self._heartbeat_at_s = now_s + self._heartbeat_every_s
                 self._port.send(self.network.heartbeat_frame)
         except OSError as error:
             raise self._reader.lost(error) from error
+        if and_sync:
+            self.sync_ahead()
 
     def faults(self) -> tuple[Fault, ...]:
         """Return why the drives must be stopped; axes are numbered within this group."""

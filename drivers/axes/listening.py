@@ -157,10 +157,7 @@ class ListeningDevice:
             for monitor in ahead:
                 monitor.skip_cycle()
 
-    def sync_ahead(self) -> None:
-        """Send nothing: the other master sends SYNC."""
-
-    def transmit(self) -> None:
+    def transmit(self, and_sync: bool = False) -> None:
         """Send nothing, regardless of `command`."""
         self.command.sent_torque_Nm.fill(0.0)
 

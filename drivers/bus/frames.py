@@ -165,10 +165,12 @@ class Batch:
         self.lengths: MutableSequence[int] = [0] * len(frames.rows)
         """Length of the packet received into each row, 0 if the other side has closed."""
 
-    def send(self) -> None:
-        """Send all rows."""
+    def send(self, then: bytes = b"") -> None:
+        """Send all rows, then the frame `then` if it is not empty."""
         for row in self._rows:
             self._port.send(row)
+        if then:
+            self._port.send(then)
 
     def receive(self) -> int:
         """Fill the first rows with frames that have arrived, without waiting; return how many."""
@@ -239,13 +241,16 @@ class KernelBatch(Batch):
         _send_all(-1, self._at, 0)
         _receive_all(-1, self._at, 0, _DONTWAIT)
 
-    def send(self) -> None:
-        """Send all rows; rows that do not fit into the socket are sent one by one by the port."""
+    def send(self, then: bytes = b"") -> None:
+        """See `Batch.send`; rows that do not fit into the socket are sent one by one by the port.
+        """
         rows = self._rows
         sent = _send_all(self._port.fileno(), self._at, len(rows))
         if sent < len(rows):
             for row in rows[max(sent, 0) :]:
                 self._port.send(row)
+        if then:
+            self._port.send(then)
 
     def receive(self) -> int:
         """Fill the first rows with frames that have arrived, without waiting; return how many."""

@@ -179,9 +179,14 @@ class _PacketBatch(KernelBatch):
         self._packet = frames.packet
         self._packet[: _LAYOUT.size] = _LAYOUT.pack(_FRAMES, 0.0, 0.0)
 
-    def send(self) -> None:
+    def send(self, then: bytes = b"") -> None:
         """See `Batch.send`."""
+        if then and len(self._rows) < _MOST_FRAMES:
+            self._port.send(b"".join((self._packet, then)))
+            return
         self._port.send(self._packet)
+        if then:
+            self._port.send(then)
 
 
 class SimulatedBus(FrameReader):

@@ -136,7 +136,7 @@ class _NoDrives:
         """Expect nothing."""
         return 0
 
-    def transmit(self) -> None:
+    def transmit(self, and_sync: bool = False) -> None:
         """Send nothing."""
 
 

@@ -186,8 +186,8 @@ def test_a_lost_bus_loses_no_measured_row(tmp_path: Path) -> None:
             if self.feedback.cycle > self.last:
                 raise ConnectionError("the bus is lost")
 
-        def transmit(self) -> None:
-            super().transmit()
+        def transmit(self, and_sync: bool = False) -> None:
+            super().transmit(and_sync)
             if self.feedback.cycle > self.last:
                 raise ConnectionError("the bus is lost")
 
@@ -381,8 +381,8 @@ def test_a_torque_computed_from_old_answers_is_not_sent() -> None:
             super().__init__(lockstep=False)
             self.sent: dict[int, float] = {}
 
-        def transmit(self) -> None:
-            super().transmit()
+        def transmit(self, and_sync: bool = False) -> None:
+            super().transmit(and_sync)
             self.sent[self.feedback.cycle] = float(self.command.torque_Nm[0])
 
     class Stopped(Proportional):

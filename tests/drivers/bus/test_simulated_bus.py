@@ -92,6 +92,23 @@ def test_two_to_26_commands_are_sent_in_one_packet(led: Led) -> None:
         assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
 
 
+SYNC = frame(0x80)
+
+
+def test_a_sync_after_2_to_25_commands_is_in_their_packet(led: Led) -> None:
+    for n in (2, 25):
+        batch, _, frames = commands(led, n)
+        batch.send(SYNC)
+        assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames + SYNC]
+
+
+@pytest.mark.parametrize("n", [1, 26, 27])
+def test_a_sync_after_other_numbers_of_commands_follows_alone(led: Led, n: int) -> None:
+    batch, _, _ = commands(led, n)
+    batch.send(SYNC)
+    assert led.sent()[-1] == SYNC
+
+
 @pytest.mark.parametrize("n", [1, 27])
 def test_a_single_command_or_more_than_26_are_sent_one_by_one(led: Led, n: int) -> None:
     batch, _, frames = commands(led, n)
