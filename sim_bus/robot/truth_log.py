@@ -21,7 +21,7 @@ from typing_extensions import override
 
 from cdpr_profiles.bounded_input import may_replace
 from cdpr_profiles.errors import printable
-from cdpr_profiles.jit import jit
+from cdpr_profiles.jit import bound, jit
 from cdpr_sim_bus.physics_board import BoardPlatform, PlatformState
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot
@@ -131,6 +131,10 @@ class TruthLog(RecordFile):
 # immediately, so that the last one can be read while the robot runs.
 
 
+_STAMP = struct.Struct("<Id")
+"""The first two fields of a record."""
+
+
 def _motor_fields(n: int) -> list[tuple[str, str, tuple[int]]]:
     names = ("tension_N", "motor_rad", "torque_Nm", "motor_rad_s", "power_on")
     return [(name, "<f8", (n,)) for name in names]
@@ -142,7 +146,6 @@ class PoseLog(RecordFile):
     def __init__(self, path: Path, robot: CableRobot) -> None:
         """Create the file; raises OSError."""
         n = robot.n
-        self._robot = robot
         fields = [
             ("sync_index", "<u4"),
             ("time_s", "<f8"),
@@ -152,22 +155,21 @@ class PoseLog(RecordFile):
             *_motor_fields(n),
         ]
         self._row = np.zeros(1, np.dtype(fields))
-        self._bytes = self._row.view(np.uint8).data
+        self._bytes = memoryview(self._row.view(np.uint8).data)
         # views: otherwise the kernel would be compiled again for each number of motors
-        self._parts = [self._row[field[0]][0] for field in fields[2:]]
+        parts = [self._row[field[0]][0] for field in fields[2:]]
+        self._fill = bound(fill_record, robot.platform, robot.motors, *parts, then=())
         header = {
             "format": "cdpr-rt pose log 1",
             "record_bytes": self._row.itemsize,
             "fields": fields,
         }
         super().__init__(path, header)
-        fill_record(robot.platform, robot.motors, *self._parts)
 
     def append(self, sync_index: int, time_s: float, _truth: tuple[float, ...]) -> None:
         """Append the true state of the robot, including its first motor."""
-        row = self._row[0]
-        row["sync_index"], row["time_s"] = sync_index, time_s
-        fill_record(self._robot.platform, self._robot.motors, *self._parts)
+        _STAMP.pack_into(self._bytes, 0, sync_index, time_s)
+        self._fill()
         self.write(self._bytes)
 
 
