@@ -47,6 +47,10 @@ def test_other_commands_are_not_loaded() -> None:
     assert not {"pymodbus", "matplotlib", "fastapi", "httpx"} & loaded
 
 
+def test_a_script_starts_the_simulator_before_it_loads_buses_and_kernels() -> None:
+    assert not {"numba", "can", "canopen"} & _loaded("import cdpr_tools.simulate")
+
+
 def test_kernels_do_not_load_scipys_linear_algebra_and_keep_it_usable() -> None:
     call = "import numba; assert numba.njit(lambda x: 2.0 * x)(2.0) == 4.0"
     loaded = _loaded(f"import cdpr_profiles.jit; {call}")

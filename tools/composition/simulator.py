@@ -12,16 +12,17 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from cdpr_drivers.robot.robot_buses import robot_urls
-from cdpr_profiles.robot import Robot
 from cdpr_tools.compiling import NOTICE, pass_on
-from cdpr_tools.composition.fault_injection import SimulatorChannel
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import end_by_stdin, module_command
+
+if TYPE_CHECKING:
+    from cdpr_profiles.robot import Robot
+    from cdpr_tools.composition.fault_injection import SimulatorChannel
 
 # if installation has not compiled the physics, the first start does; it may take minutes
 _START_TIMEOUT_S = 600.0
@@ -237,6 +238,10 @@ class LockstepSimulator(OwnSimulator, RobotSimulator):
     @override
     def _ask(self, key: str, value: Any = True) -> Any:
         if self._channel is None:
+            # imported here: the buses load slowly, and a simulator must start before that
+            from cdpr_drivers.robot.robot_buses import robot_urls  # noqa: PLC0415
+            from cdpr_tools.composition.fault_injection import SimulatorChannel  # noqa: PLC0415
+
             url = next(iter(robot_urls(self._robot, [self.bus]).values()))
             self._channel = SimulatorChannel(url)
         return self._channel.ask(key, value)
