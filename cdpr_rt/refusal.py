@@ -26,7 +26,8 @@ class RefusalCode(StrEnum):
     """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
     NOT_FEASIBLE = "not_feasible"
     """The platform cannot hold a position, or cannot get there in a straight line (`why`; `outside`
-    its workspace; `enter_m`: the nearest place of the workspace, if the platform is outside)."""
+    its workspace, then also `why_si`, in m and rad; `enter_m`: the nearest place of the workspace,
+    if the platform is outside)."""
     NOTHING_LEFT = "nothing_left"
     """There is nothing to continue (`left`: target or path, `instead`: the alternative)."""
     NOT_TIGHT = "not_tight"
@@ -54,7 +55,15 @@ class CommandRefusal:
     def __str__(self) -> str:
         if self.code is RefusalCode.OUT_OF_RANGE:
             return f"{self.command}: {self._keys()}; {self.reason(numbers='a number from ')}"
-        parts = (self.command, self._keys(), self.reason(option="from "))
+        return self._text()
+
+    def in_si(self) -> str:
+        """Return the text with places in m and rad, for the reader of a script."""
+        why_si = self.arguments.get("why_si")
+        return str(self) if why_si is None else self._text(units={}, why=why_si)
+
+    def _text(self, units: Mapping[str, tuple[float, str]] = _PLACE_UNITS, **others: Any) -> str:
+        parts = (self.command, self._keys(units), self.reason(option="from ", **others))
         return ": ".join(part for part in parts if part)
 
     def reason(self, **others: Any) -> str:
@@ -79,11 +88,11 @@ class CommandRefusal:
         )
         return f"{arguments['why']}{entering}"
 
-    def _keys(self) -> str:
+    def _keys(self, units: Mapping[str, tuple[float, str]] = _PLACE_UNITS) -> str:
         index = self.arguments.get("index")
         place = "" if index is None else f"[{index}]"
         return ", ".join(
-            key if value is True else f"{key}{place}: value {_in_units_of_places(key, value)}"
+            key if value is True else f"{key}{place}: value {_in_units(units, key, value)}"
             for key, value in self.asked.items()
         )
 
@@ -117,11 +126,11 @@ class CommandRefusal:
         return all(is_sound(arguments.get(key)) for key, is_sound in _ARGUMENTS[self.code].items())
 
 
-def _in_units_of_places(key: str, value: Any) -> str:
-    """Return a value as text; positions are converted to the units of the messages."""
-    if key not in _PLACE_UNITS or not isinstance(value, list) or not all(map(_is_number, value)):
+def _in_units(units: Mapping[str, tuple[float, str]], key: str, value: Any) -> str:
+    """Return a value as text; positions are converted to the units of their keys."""
+    if key not in units or not isinstance(value, list) or not all(map(_is_number, value)):
         return shown(value)
-    factor, unit = _PLACE_UNITS[key]
+    factor, unit = units[key]
     return f"{shown([round(factor * x, 1) + 0.0 for x in value])} {unit}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -410,14 +411,7 @@ class Robot:
         rotation stays unchanged. `speed_m_s` is the top speed, by default that of the robot's file.
         With `wait=False` the call returns immediately; `wait_until_done` waits for the end.
         """
-        position = self._vector("position_m", position_m, self._k, "coordinate, in m")
-        rotation = self._vector("rotation_rad", rotation_rad, self._c, "controlled angle, in rad")
-        self._move(
-            wait,
-            position_m=position,
-            rotation_rad=rotation,
-            speed_m_s=_positive("speed_m_s", speed_m_s),
-        )
+        self._move(wait, speed_m_s, position_m=position_m, rotation_rad=rotation_rad)
 
     def move_by(
         self,
@@ -433,21 +427,27 @@ class Robot:
         The axes of the motion are those of `frame`, "room" or "platform". All else is as in
         `move_to`.
         """
-        distance = self._vector("distance_m", distance_m, self._k, "coordinate, in m")
-        turn = self._vector("turn_rad", turn_rad, self._c, "controlled angle, in rad")
-        self._move(
-            wait,
-            distance_m=distance,
-            turn_rad=turn,
-            frame=frame,
-            speed_m_s=_positive("speed_m_s", speed_m_s),
-        )
+        self._move(wait, speed_m_s, distance_m=distance_m, turn_rad=turn_rad, frame=frame)
 
-    def _move(self, wait: bool, **arguments: Any) -> None:
-        given = {key: value for key, value in arguments.items() if value is not None}
-        if not given.keys() - {"frame", "speed_m_s"}:
-            names = [key for key in arguments if key not in ("frame", "speed_m_s")]
-            raise InvalidArgument(f"nothing to move; give {' or '.join(names)}")
+    def _move(
+        self, wait: bool, speed_m_s: float | None, frame: str | None = None, **to: ArrayLike | None
+    ) -> None:
+        """Move by or to the two places `to`, a position and a rotation."""
+        if not self._k:
+            raise Refused(f"{self.name} has no platform; use turn_to, turn_by or pay_out")
+        sizes = (self._k, "coordinate, in m"), (self._c, "controlled angle, in rad")
+        places = zip(to.items(), sizes, strict=True)
+        given: dict[str, Any] = {
+            key: self._vector(key, value, *size)
+            for (key, value), size in places
+            if value is not None
+        }
+        if not given:
+            raise InvalidArgument(f"nothing to move; give {' or '.join(to)}")
+        if frame is not None:
+            given["frame"] = frame
+        if speed_m_s is not None:
+            given["speed_m_s"] = _positive("speed_m_s", speed_m_s)
         try:
             self._carry_out("pose", given, wait)
         except Refused as error:
@@ -481,9 +481,13 @@ class Robot:
         self._turn("cable_m", cable_m, speed_rad_s, wait)
 
     def _turn(self, key: str, value: ArrayLike, speed_rad_s: float | None, wait: bool) -> None:
-        angles = self._vector(key, value, len(self.axes), "axis", optional=True)
-        speed = _positive("speed_rad_s", speed_rad_s)
-        wanted = {key: angles} | ({} if speed is None else {"speed_rad_s": speed})
+        if self._k:
+            raise Refused(f"{self.name} has a platform; use move_to or move_by")
+        wanted: dict[str, Any] = {
+            key: self._vector(key, value, len(self.axes), "axis", optional=True)
+        }
+        if speed_rad_s is not None:
+            wanted["speed_rad_s"] = _positive("speed_rad_s", speed_rad_s)
         self._carry_out("pid", wanted, wait)
 
     def jog(self, velocity_rad_s: ArrayLike, duration_s: float) -> None:
@@ -519,7 +523,7 @@ class Robot:
         `resume` continues it. Raises Refused if the path needs more than one plan, or if the robot
         cannot follow it; the message then gives the line.
         """
-        file = Path(path)
+        file = path_of("path", path)
         if not file.is_file():
             raise InvalidArgument(f"{file}: no such file")
         self.run("path", plan=self._backend.plan(file))
@@ -535,7 +539,6 @@ class Robot:
         has no stream.
         """
         factor, k = _positive("scale", scale), self._k or min(3, len(self.axes))
-        assert factor is not None  # it was given
         with self._backend.open_stream() as send_packet, _HeldOnError(self, Refused):
 
             def send(position_m: ArrayLike) -> None:
@@ -565,8 +568,7 @@ class Robot:
 
     def wait(self, seconds: float) -> None:
         """Let this time pass on the robot's clock, s; raises Faulted if a fault removes power."""
-        if not math.isfinite(seconds) or seconds < 0.0:
-            raise InvalidArgument(f"seconds: {seconds!r}; allowed: a number from 0")
+        seconds = _duration(seconds)
         with _HeldOnError(self):
             powered = self.state == "active"
             for part in range(math.ceil(round(seconds / _RENEW_S, 6))):
@@ -579,7 +581,8 @@ class Robot:
         A daemon sends some 50 per second, with only `time_s`, `position_rad`, `cable_length_m` and
         `tension_N`.
         """
-        powered, rows = self.state == "active", self._backend.observe(seconds)
+        seconds, powered = _duration(seconds), self.state == "active"
+        rows = self._backend.observe(seconds)
         self._require_power(powered, self._look())
         return rows
 
@@ -612,10 +615,9 @@ class Robot:
     # -- helpers
 
     def _carry_out(self, program: str, wanted: Mapping[str, Any], wait: bool = True) -> None:
-        with _HeldOnError(
-            self, Refused, InvalidArgument
-        ):  # `wait_until_done` handles the other errors
-            self._start(program, wanted)
+        # `wait_until_done` handles the other errors
+        with _HeldOnError(self, Refused, InvalidArgument):
+            self._start(program, {key: _plain(key, value) for key, value in wanted.items()})
             if wait:
                 self.wait_until_done()
 
@@ -632,10 +634,9 @@ class Robot:
                 error = self._fault(status)  # the robot is stopping
                 if isinstance(error, Faulted):
                     raise error from None
-            if refused.code is RefusalCode.NOT_IN_STATE and status["state"] in _NEXT:
-                text = f"{refused.refusal}; {_NEXT[status['state']]}"
-                raise Refused(text, refused.refusal) from None
-            raise
+            if (text := _text_for_script(refused, status["state"])) == str(refused):
+                raise
+            raise Refused(text, refused.refusal) from refused.__cause__
         if program in _STANDING:
             self._started = ""
 
@@ -699,11 +700,9 @@ class Robot:
         return Faulted(str(status["reason"]), details.get("limit"), name)
 
     def _vector(
-        self, name: str, value: ArrayLike | None, size: int, each: str, optional: bool = False
-    ) -> list[float | None] | None:
+        self, name: str, value: ArrayLike, size: int, each: str, optional: bool = False
+    ) -> list[float | None]:
         """Return numbers as a list, with None for nan if `optional`; raises InvalidArgument."""
-        if value is None:
-            return None
         try:
             numbers = np.asarray(value, float)
         except (TypeError, ValueError):
@@ -711,7 +710,7 @@ class Robot:
                 f"{name}: {value!r}; allowed: {size} numbers, one for each {each}"
             ) from None
         if not size:
-            raise InvalidArgument(f"{name}: {self.name} has no {each}; omit it")
+            raise InvalidArgument(f"{name}: {self.name} has no {each.partition(',')[0]}; omit it")
         if numbers.shape != (size,):
             raise InvalidArgument(
                 f"{name}: shape {numbers.shape}; allowed: ({size},), one number for each {each}"
@@ -773,16 +772,54 @@ def is_at_rest(axis: Mapping[str, Any]) -> bool:
     return not (off > _REST_RAD or abs(speed) > _REST_RAD_S)
 
 
-def _positive(name: str, value: float | None) -> float | None:
-    if value is None:
-        return None
+def path_of(name: str, value: str | Path) -> Path:
+    """Return a user's path; raises InvalidArgument."""
+    try:
+        return Path(value)
+    except TypeError:
+        raise InvalidArgument(f"{name}: {value!r}; allowed: a path") from None
+
+
+def _positive(name: str, value: float) -> float:
+    number = _finite(value)
+    if not number > 0.0:
+        raise InvalidArgument(f"{name}: {value!r}; allowed: a finite number above 0")
+    return number
+
+
+def _duration(value: float) -> float:
+    number = _finite(value)
+    if not number >= 0.0:
+        raise InvalidArgument(f"seconds: {value!r}; allowed: a finite number from 0")
+    return number
+
+
+def _finite(value: float) -> float:
+    """Return a finite number, or nan."""
     try:
         number = float(value)
     except (TypeError, ValueError):
-        number = math.nan
-    if not 0.0 < number < math.inf:
-        raise InvalidArgument(f"{name}: {value!r}; allowed: a finite number above 0")
-    return number
+        return math.nan
+    return number if math.isfinite(number) else math.nan
+
+
+def _plain(name: str, value: Any) -> Any:
+    """Return an argument of a program as JSON has it; raises InvalidArgument."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=lambda array: array.tolist()))
+    except (AttributeError, RecursionError, TypeError, ValueError):
+        raise InvalidArgument(
+            f"{name}: {value!r}; allowed: texts, finite numbers, lists of these"
+        ) from None
+
+
+def _text_for_script(refused: Refused, state: str) -> str:
+    """Return the text of a refusal with the next step, or with places in the units of a script."""
+    if (refusal := refused.refusal) is None:
+        return str(refused)
+    if refusal.code is RefusalCode.NOT_IN_STATE and state in _NEXT:
+        return f"{refusal}; {_NEXT[state]}"
+    return refusal.in_si() if "why_si" in refusal.arguments else str(refused)
 
 
 def _level_of_script() -> int:

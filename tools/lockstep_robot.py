@@ -307,7 +307,7 @@ class LockstepRobot:
         if self._boots:
             self.boot()
         self._began = self.rows_written
-        if self._truth_path is not None:
+        if not robot.is_winch:  # the log of a single drive has another format
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
         if self._pinned and own is not None:
             stack.enter_context(one_core(own.process.pid))
@@ -542,9 +542,9 @@ class LockstepRobot:
             self.turn(max(1, round(seconds / self.period_s)))
 
     def observe(self, seconds: float) -> Row:
-        """Run cycles for some seconds; return their rows."""
+        """Run cycles for some seconds, at least two; return their rows."""
         began = self.rows_written
-        self.wait(seconds)
+        self.wait(max(seconds, 2.0 * self.period_s))
         return self.kept_rows(began)
 
     def true_pose(self) -> FloatArray:

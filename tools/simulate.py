@@ -16,7 +16,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.code_loader import CodeError
 from cdpr_rt.errors import ControlError
-from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
+from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot, path_of
 from cdpr_tools.composition.simulator import LockstepSimulator
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.loading import without_collection
@@ -48,7 +48,7 @@ def simulate(
     script gives the same rows. Use the handle from one thread. Closing it removes the power. Raises
     InvalidRobot, and Error if the drives do not get ready.
     """
-    plant_file = None if plant is None else Path(plant)
+    plant_file = None if plant is None else path_of("plant", plant)
     if plant_file is not None and not plant_file.is_file():
         raise InvalidArgument(f"plant: {plant_file}: no such file")
     try:

@@ -87,7 +87,7 @@ class AxisDevice(Protocol):
     def receive(self) -> int:
         """Wait for the answers, decode them into `feedback`; return how many axes answered."""
 
-    def transmit(self, and_sync: bool = False) -> None:
+    def transmit(self, and_sync: bool = False, /) -> None:
         """Encode `command` and send it, to act from the next SYNC on.
 
         With `and_sync` that SYNC follows now, so that the drives work while the row is written. Set

@@ -53,30 +53,25 @@ class Arrival:
         self.near_m = near_m
         self._near_cycles, self._most_cycles = round(near_s / period_s), round(waited_s / period_s)
         self._near = self._standing = 0
-        self.off_m = 0.0
-        """Distance of the platform from its set-point in the last cycle."""
 
     def restart(self) -> None:
         """Begin again, because the set-point is about to move."""
         self._near = self._standing = 0
-        self.off_m = 0.0
 
     def update(self, standing: bool, off_m: float) -> None:
         """Count a cycle: is the set-point `standing`, and how far (`off_m`) is the platform."""
         self._standing = self._standing + 1 if standing else 0
         self._near = self._near + 1 if standing and off_m < self.near_m else 0
-        self.off_m = off_m
 
     @property
     def over(self) -> bool:
         """Whether the wait is over."""
         return self._near > self._near_cycles or self._standing > self._most_cycles
 
-    def text(self) -> str:
-        """Return as text how far the platform is from the set-point, "" if it has arrived."""
-        if not self.over or self._near > self._near_cycles:
-            return ""
-        return f"the platform stands {1e3 * self.off_m:.1f} mm from its target"
+    @property
+    def missed(self) -> bool:
+        """Whether the wait is over although the platform is not near its set-point."""
+        return self.over and self._near <= self._near_cycles
 
 
 _SLOWED_m, _WAITING_m = 0.02, 0.05
@@ -364,8 +359,17 @@ class PlatformProgram(CommandedProgram):
             "missing": control.tension_infeasibility(),
             "held_back": self._held_back(),
             "done": float(self._at_rest and self._arrival.over),
-            "trouble": self._arrival.text() or self._swing_text(),
+            "trouble": self._off_text() or self._swing_text(),
         }
+
+    def _off_text(self) -> str:
+        """Return as text how far the platform stands from its target, "" if it has arrived."""
+        if not self._arrival.missed:
+            return ""
+        control, k = self._control, self._k
+        off = control.estimated - control.shaped
+        turned = f" and {math.degrees(np.linalg.norm(off[k:])):.1f} deg" if off.size > k else ""
+        return f"the platform stands {1e3 * np.linalg.norm(off[:k]):.1f} mm{turned} from its target"
 
     def _swing_text(self) -> str:
         """Return as text how far a platform that has arrived may swing, "" if only a little."""

@@ -257,7 +257,7 @@ class PoseProgram(PlatformProgram):
         leads = "" if asked.keys() & {*_ABSOLUTE} else "leads to "
         if asked.keys() & {"position_m", *_RELATIVE}:
             if beyond := self._beyond_box(position):
-                more = {}
+                more: dict[str, Any] = {"why_si": leads + self._beyond_box(position, 1.0, "m")}
                 if start is not None and self._beyond_box(start):
                     more["enter_m"] = np.clip(
                         start[:k].round(3) + 0.0, self._low, self._high
@@ -265,7 +265,8 @@ class PoseProgram(PlatformProgram):
                 raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True, **more))
             position[:k] = np.clip(position[:k], self._low, self._high)
         if asked.keys() & {"turn_rad", "rotation_rad"} and (beyond := self._beyond_angle(position)):
-            raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True))
+            more = {"why_si": leads + self._beyond_angle(position, 1.0, "rad")}
+            raise ProgramError(self._not_feasible(asked, leads + beyond, outside=True, **more))
         angle = float(np.linalg.norm(position[k:]))
         if angle > most_rad:
             position[k:] *= most_rad / angle
@@ -273,25 +274,27 @@ class PoseProgram(PlatformProgram):
             raise ProgramError(self._not_feasible(asked, why_not))
         self._require_way(position, asked)
 
-    def _beyond_box(self, position: FloatArray) -> str:
+    def _beyond_box(self, position: FloatArray, unit: float = 1e3, name: str = "mm") -> str:
         """Return a text that says which coordinate is outside the box of targets, or ""."""
         off = np.abs(position[: self._k] - np.clip(position[: self._k], self._low, self._high))
         i = int(off.argmax())
         if off[i] <= _ROUNDING:
             return ""
         return (
-            f"{'xyz'[self._directions[i]]} {1e3 * position[i]:.6g} mm; allowed: "
-            f"{1e3 * self._low[i]:g} to {1e3 * self._high[i]:g} mm, the workspace"
+            f"{'xyz'[self._directions[i]]} {unit * position[i]:.6g} {name}; allowed: "
+            f"{unit * self._low[i]:g} to {unit * self._high[i]:g} {name}, the workspace"
         )
 
-    def _beyond_angle(self, position: FloatArray) -> str:
+    def _beyond_angle(
+        self, position: FloatArray, unit: float = math.degrees(1.0), name: str = "deg"
+    ) -> str:
         """Return a text if a rotation exceeds the workspace angle, else ""."""
         angle, most_rad = float(np.linalg.norm(position[self._k :])), self._parts.model.angle_rad
         if angle <= most_rad + _ROUNDING:
             return ""
         return (
-            f"{math.degrees(angle):.4g} deg from the orientation at home; "
-            f"allowed: up to {math.degrees(most_rad):.4g} deg"
+            f"{unit * angle:.4g} {name} from the orientation at home; "
+            f"allowed: up to {unit * most_rad:.4g} {name}"
         )
 
     def _require_way(self, position: FloatArray, asked: Mapping[str, Any]) -> None:

@@ -157,7 +157,7 @@ class ListeningDevice:
             for monitor in ahead:
                 monitor.skip_cycle()
 
-    def transmit(self, and_sync: bool = False) -> None:
+    def transmit(self, _and_sync: bool = False) -> None:
         """Send nothing, regardless of `command`."""
         self.command.sent_torque_Nm.fill(0.0)
 

@@ -242,8 +242,7 @@ class KernelBatch(Batch):
         _receive_all(-1, self._at, 0, _DONTWAIT)
 
     def send(self, then: bytes = b"") -> None:
-        """See `Batch.send`; rows that do not fit into the socket are sent one by one by the port.
-        """
+        """See `Batch.send`; the port sends rows that do not fit into the socket one by one."""
         rows = self._rows
         sent = _send_all(self._port.fileno(), self._at, len(rows))
         if sent < len(rows):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def test_relative_moves_add_up(robot: cdpr.Robot) -> None:
     robot.move_by([0.1, 0.0])
     robot.move_by([0.0, 0.05], frame="platform")
     assert robot.position_m == pytest.approx([0.1, 1.85], abs=2e-3)
-    with pytest.raises(cdpr.Refused, match="leads to x 1100 mm; allowed: -600 to 600 mm") as error:
+    with pytest.raises(cdpr.Refused, match=r"leads to x 1\.1 m; allowed: -0\.6 to 0\.6 m") as error:
         robot.move_by([1.0, 0.0])
     assert error.value.code is RefusalCode.NOT_FEASIBLE
 
@@ -116,14 +117,27 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
         robot.move_to([0.0, 1.8], speed_m_s=-1.0)
     with pytest.raises(cdpr.InvalidArgument, match="nothing to move; give position_m or rotation"):
         robot.move_to()
-    with pytest.raises(cdpr.Refused, match=r"-600 to 600 mm, the workspace$"):
+    with pytest.raises(cdpr.Refused, match=r"-0\.6 to 0\.6 m, the workspace$"):
         robot.move_to([9.0, 1.8])
     with pytest.raises(cdpr.Refused, match=r"2000\.0; allowed: .*; position_m is in metres"):
         robot.move_to([300, 2000])
-    with pytest.raises(cdpr.Refused, match=r"600 mm, the workspace; distance_m is in metres"):
+    with pytest.raises(cdpr.Refused, match=r"0\.6 m, the workspace; distance_m is in metres"):
         robot.move_by([100, 0])
     with pytest.raises(cdpr.Refused, match=r"program: .dance.; allowed: idle, hold"):
         robot.run("dance")
+    with pytest.raises(cdpr.Refused, match="has a platform; use move_to or move_by"):
+        robot.turn_by([0.1, 0.1, 0.1])
+    wrong: Any
+    for wrong in (-1.0, float("nan"), "long"):
+        for method in (robot.wait, robot.observe):
+            with pytest.raises(
+                cdpr.InvalidArgument, match=r"seconds: .*; allowed: a finite number"
+            ):
+                method(wrong)
+    for wrong in ({0.0, 1.8}, [0.0, float("nan")]):
+        with pytest.raises(cdpr.InvalidArgument, match=r"position_m: .*; allowed: texts, finite"):
+            robot.run("pose", position_m=wrong)
+    robot.run("pose", position_m=robot.position_m)  # an array is a list of numbers
 
 
 def interrupt_turn(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
@@ -251,9 +265,22 @@ def test_axes_of_a_robot_without_a_platform_turn_and_jog() -> None:
         assert robot.log("time_s", "torque_actual_Nm").dtype.names == ("time_s", "torque_actual_Nm")
         with pytest.raises(cdpr.InvalidArgument, match=r"fields: .*'time'.* allowed: cycle"):
             robot.log("time")
+        assert robot.observe(0.0).size == 2
+        with pytest.raises(cdpr.Refused, match="has no platform; use turn_to"):
+            robot.move_to([0.0, 1.8])
         observed = robot.observe(0.1)
         assert np.diff(observed["time_s"]).sum() == pytest.approx(0.1, abs=0.01)
         assert robot.pose == pytest.approx(np.full(7, np.nan), nan_ok=True)
+
+
+def test_a_single_winch_is_a_robot_with_one_axis() -> None:
+    with cdpr.simulate("winch-mpp0923d") as robot:
+        robot.enable()
+        begun = robot.angle_rad
+        robot.turn_by([0.2])
+        assert robot.angle_rad - begun == pytest.approx([0.2], abs=0.02)
+        with pytest.raises(cdpr.InvalidArgument, match=r"true_pose: .* has no platform"):
+            _ = robot.true_pose
 
 
 def test_two_simulations_of_one_script_give_the_same_rows() -> None:
@@ -270,8 +297,10 @@ def test_two_simulations_of_one_script_give_the_same_rows() -> None:
 def test_an_unknown_robot_and_a_missing_daemon_raise_specific_errors() -> None:
     with pytest.raises(cdpr.InvalidRobot, match="no-such-robot"):
         cdpr.simulate("no-such-robot")
+    with pytest.raises(cdpr.InvalidRobot, match="no profile named 'planar-33'; did you mean"):
+        cdpr.connect("planar-33")
     with pytest.raises(cdpr.NotRunning, match="`cdpr run ROBOT` starts one"):
-        cdpr.connect("no-such-robot")
+        cdpr.connect("suspended-8")
     assert issubclass(cdpr.NotRunning, cdpr.Error) and issubclass(cdpr.InvalidArgument, ValueError)
 
 

@@ -136,7 +136,7 @@ class _NoDrives:
         """Expect nothing."""
         return 0
 
-    def transmit(self, and_sync: bool = False) -> None:
+    def transmit(self, _and_sync: bool = False) -> None:
         """Send nothing."""
 
 

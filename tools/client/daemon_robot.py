@@ -31,6 +31,7 @@ from cdpr_rt.robot import (
     NotRunning,
     Refused,
     Robot,
+    path_of,
 )
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSession
@@ -83,8 +84,13 @@ def connect(robot: str | Path | None = None, *, socket: str | Path | None = None
     """
     with ExitStack() as stack, _errors_of_opening():
         name = None if robot is None else str(robot)
-        unix = None if socket is None else Path(socket)
-        daemon = stack.enter_context(open_daemon(name, unix, None, None))
+        unix = None if socket is None else path_of("socket", socket)
+        try:
+            daemon = stack.enter_context(open_daemon(name, unix, None, None))
+        except NoDaemonError:
+            if name is not None:
+                load_robot(name)  # raises if there is no such robot
+            raise
         await_start(daemon, Output(as_json=True))
         backend = _Remote(daemon)
         backend.opened = stack.pop_all()
@@ -116,7 +122,7 @@ def run(
     not start, or does not confirm at its end that the power is off.
     """
     _require_no_daemon(str(robot))
-    buses = [bus] if isinstance(bus, str) else list(bus or ())
+    buses = _texts("bus", bus or ())
     with _errors_of_opening():
         real = real_buses(load_robot(robot), buses)
     if real and not yes:
@@ -131,7 +137,7 @@ def run(
         ("--tension-distribution", tension_distribution),
     ):
         options += [] if value is None else [option, str(value)]
-    options += [word for program in programs for word in ("--program", program)]
+    options += [word for program in _texts("programs", programs) for word in ("--program", program)]
     options += ["--allow-code"] * allow_code
     with ExitStack() as stack, _errors_of_opening():
         try:
@@ -146,6 +152,13 @@ def run(
         process.lowering_s = float(backend.description.get("lowering_s", 0.0))
         backend.opened = stack.pop_all()
         return Robot(backend)
+
+
+def _texts(name: str, value: str | Sequence[str]) -> list[str]:
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
+        raise InvalidArgument(f"{name}: {value!r}; allowed: a text, or a list of texts")
+    return list(texts)
 
 
 def _require_no_daemon(robot: str) -> None:

@@ -49,7 +49,7 @@ class Drives:
         self.clock.time_s += 1.1e-3 + self.computing_s
         return 0
 
-    def transmit(self, and_sync: bool = False) -> None:
+    def transmit(self, _and_sync: bool = False) -> None:
         self.sent_s.append(self.clock.time_s)
 
 

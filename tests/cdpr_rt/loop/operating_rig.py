@@ -69,7 +69,7 @@ class Inertias:
             self.feedback.position_rad[:] = self.angle
         return 2 if answers else 0
 
-    def transmit(self, and_sync: bool = False) -> None:
+    def transmit(self, _and_sync: bool = False) -> None:
         self.pending = self.command.torque_Nm.copy()
         self.command.sent_torque_Nm[:] = self.command.torque_Nm
 
