@@ -56,9 +56,9 @@ def load(
             lambda: own or named_distribution(profile),
         )
     except CodeError as error:
-        raise InvalidArgument(str(error)) from error
+        raise InvalidArgument(str(error)) from None
     except (ProfileError, ControlError) as error:
-        raise InvalidRobot(str(error)) from error
+        raise InvalidRobot(str(error)) from None
 
 
 class Model:
@@ -246,9 +246,9 @@ class Model:
                 self._model.poses(rows), self._reduced(force, moment), self._own_distribution()
             )
         except ProfileError as error:
-            raise InvalidRobot(str(error)) from error
+            raise InvalidRobot(str(error)) from None
         except TensionDistributionError as error:
-            raise InvalidArgument(str(error)) from error
+            raise InvalidArgument(str(error)) from None
         found[~carried] = np.nan
         return found.reshape(*shape, self.n)
 

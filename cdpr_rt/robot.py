@@ -23,6 +23,9 @@ from cdpr_rt.refusal import CommandRefusal, RefusalCode
 class Error(Exception):
     """Base class of all errors of a robot handle."""
 
+    origin: Exception | None = None
+    """Error of the daemon's client for which this one stands, if any."""
+
 
 class InvalidRobot(Error):  # noqa: N818
     """The robot is unknown, or its file cannot be used; the message names file, key and value."""
@@ -453,8 +456,7 @@ class Robot:
         except Refused as error:
             for key in ("position_m", "distance_m"):
                 if np.abs(given.get(key, 0.0)).max() > _LIKELY_mm:
-                    text = f"{error}; {key} is in metres"
-                    raise Refused(text, error.refusal) from error.__cause__
+                    raise _reworded(error, f"{error}; {key} is in metres") from None
             raise
 
     # -- motion of single axes
@@ -636,7 +638,7 @@ class Robot:
                     raise error from None
             if (text := _text_for_script(refused, status["state"])) == str(refused):
                 raise
-            raise Refused(text, refused.refusal) from refused.__cause__
+            raise _reworded(refused, text) from None
         if program in _STANDING:
             self._started = ""
 
@@ -811,6 +813,12 @@ def _plain(name: str, value: Any) -> Any:
         raise InvalidArgument(
             f"{name}: {value!r}; allowed: texts, finite numbers, lists of these"
         ) from None
+
+
+def _reworded(refused: Refused, text: str) -> Refused:
+    made = Refused(text, refused.refusal)
+    made.origin = refused.origin
+    return made
 
 
 def _text_for_script(refused: Refused, state: str) -> str:

@@ -624,9 +624,9 @@ class LockstepRobot:
             with _interrupts_deferred():
                 yield
         except BadInputError as error:
-            raise InvalidArgument(str(error)) from error
+            raise InvalidArgument(str(error)) from None
         except (CommandError, DriverError, ControlError) as error:
-            raise Error(str(error)) from error
+            raise Error(str(error)) from None
 
 
 @contextmanager

@@ -77,11 +77,11 @@ def simulate(
             stack.pop_all()  # the simulator belongs to the robot now
             return Robot(made.__enter__())
     except (ProfileError, BadInputError) as error:
-        raise InvalidRobot(str(error)) from error
+        raise InvalidRobot(str(error)) from None
     except CodeError as error:
-        raise InvalidArgument(str(error)) from error
+        raise InvalidArgument(str(error)) from None
     except (CommandError, DriverError, ControlError) as error:
-        raise Error(str(error)) from error
+        raise Error(str(error)) from None
 
 
 def _require_objects(controller: object, programs: object) -> None:

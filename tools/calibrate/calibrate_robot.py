@@ -145,14 +145,14 @@ def _errors_of_calibrating() -> Iterator[None]:
     try:
         yield
     except ProfileError as error:
-        raise InvalidRobot(str(error)) from error
+        raise InvalidRobot(str(error)) from None
     except (BadInputError, InvalidRequestError) as error:
-        raise InvalidArgument(_as_arguments(str(error))) from error
+        raise InvalidArgument(_as_arguments(str(error))) from None
     except (CommandError, ControlError, DriverError) as error:
         raised = Error(_as_arguments(str(error)))
         for note in getattr(error, "__notes__", ()):
             raised.add_note(note)
-        raise raised from error
+        raise raised from None
 
 
 def _as_arguments(text: str) -> str:

@@ -120,10 +120,10 @@ class PoseOperator:
                 try:
                     robot.move_to(**arguments, wait=False)
                 except Refused as error:
-                    if isinstance(error.__cause__, ServiceRefusalError):
+                    if isinstance(error.origin, ServiceRefusalError):
                         raise  # somebody else may move the robot
                     self._held_status()  # raises if the motion is being ended
-                    raise PoseRefusedError(str(error)) from None
+                    raise PoseRefusedError(str(error.refusal or error)) from None
         except TripError as error:  # before the motion began
             raise NotThePoseError(str(error)) from None
         self._deadline_s = robot.time_s + allowed_s

@@ -198,8 +198,8 @@ def robot_errors() -> Iterator[None]:
 
 
 def command_error(error: Error) -> CommandError:
-    """Return the command's error for an error of the handle: its cause, if a CommandError."""
-    cause = error.__cause__
+    """Return the command's error for an error of the handle: its origin, if a CommandError."""
+    cause = error.origin
     if not isinstance(cause, CommandError):
         bad = isinstance(error, InvalidArgument)
         cause = (BadInputError if bad else WorkFailedError)(str(error))
@@ -208,16 +208,40 @@ def command_error(error: Error) -> CommandError:
     return cause
 
 
+def _error_for_script(error: CommandError | ProfileError) -> Error:
+    """Return the error of a handle for an error of its daemon."""
+    made: Error
+    match error:
+        case CrowdedError():
+            made = Error(str(error))
+        case ConnectionLostError() | UnansweredError():
+            made = Error(f"{error}; the command may still be carried out")
+        case NoDaemonError() | LoopEndedError():
+            made = NotRunning(str(error))
+        case DaemonRefusalError():
+            made = Refused(str(error), error.refusal)
+        case ServiceRefusalError():
+            made = Refused(str(error))
+        case BadInputError():
+            made = InvalidArgument(str(error))
+        case ProfileError():
+            made = InvalidRobot(str(error))
+        case _:
+            made = Error(str(error))
+    made.origin = error
+    return made
+
+
 @contextmanager
 def _errors_of_opening() -> Iterator[None]:
     try:
         yield
     except NoDaemonError as error:
-        raise NotRunning(str(error)) from error
+        raise NotRunning(str(error)) from None
     except (ProfileError, BadInputError, DriverError) as error:
-        raise InvalidRobot(str(error)) from error
+        raise InvalidRobot(str(error)) from None
     except CommandError as error:
-        raise Error(str(error)) from error
+        raise Error(str(error)) from None
 
 
 class _Remote:
@@ -283,22 +307,8 @@ class _Remote:
             raise NotRunning("the handle is closed")
         try:
             yield
-        except CrowdedError as error:
-            raise Error(str(error)) from error
-        except (ConnectionLostError, UnansweredError) as error:
-            raise Error(f"{error}; the command may still be carried out") from error
-        except (NoDaemonError, LoopEndedError) as error:
-            raise NotRunning(str(error)) from error
-        except DaemonRefusalError as error:
-            raise Refused(str(error), error.refusal) from error
-        except ServiceRefusalError as error:
-            raise Refused(str(error)) from error
-        except BadInputError as error:
-            raise InvalidArgument(str(error)) from error
-        except ProfileError as error:
-            raise InvalidRobot(str(error)) from error
-        except CommandError as error:
-            raise Error(str(error)) from error
+        except (CommandError, ProfileError) as error:
+            raise _error_for_script(error) from None
 
     def brief_status(self) -> dict[str, Any]:
         """See `Backend.brief_status`."""
@@ -415,7 +425,7 @@ class _Remote:
                         if part["stamp_ns"][-1] >= self._began_ns:
                             rows.append(_rows_of(part, dtype))
         except RecordingError as error:
-            raise Error(str(error)) from error
+            raise Error(str(error)) from None
         log = np.concatenate(rows)
         return log[log["stamp_ns"] >= self._began_ns]
 

@@ -147,13 +147,13 @@ def _errors_of_commissioning() -> Iterator[None]:
     try:
         yield
     except ProfileError as error:
-        raise InvalidRobot(str(error)) from error
+        raise InvalidRobot(str(error)) from None
     except (BadInputError, ConfigurationError, InvalidRequestError) as error:
         text = str(error).replace("--overwrite", "overwrite=True").replace("--out", "folder")
-        raise InvalidArgument(text) from error
+        raise InvalidArgument(text) from None
     except (CommandError, ControlError, DriverError) as error:
         why = error.__cause__ if isinstance(error, WorkFailedError) else error
         if isinstance(why, InterruptedMotionError):
             raise KeyboardInterrupt(str(error)) from None
         kind = Faulted if isinstance(why, TripError | DriveFaultError) else Error
-        raise kind(str(error)) from error
+        raise kind(str(error)) from None
