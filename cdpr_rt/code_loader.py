@@ -25,12 +25,16 @@ class CodeError(ControlError):
 def load_code(reference: str) -> Any:
     """Load the object at "FILE.py:NAME" or "MODULE:NAME"; if it is a class, return an instance.
 
-    Loading runs the code of the file or module. Raises CodeError.
+    Loading runs the code of the file or module. A file can import modules from its folder unless an
+    installed module has the same name. Raises CodeError.
     """
     home, _, name = reference.rpartition(":")
     try:
         if home.endswith(".py"):
-            return _member(_run(Path(home), _read(reference, Path(home))), name)
+            source, folder = _read(reference, Path(home)), str(Path(home).resolve().parent)
+            if folder not in sys.path:
+                sys.path.append(folder)
+            return _member(_run(Path(home), source), name)
         return _member(import_module(home), name)
     except CodeError:
         raise

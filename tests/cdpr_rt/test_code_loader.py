@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,17 @@ def test_a_name_in_a_file_or_module_is_loaded_and_classes_are_instantiated(tmp_p
     assert load_code(f"{file}:Mine").n == 3
     assert load_code(f"{file}:five") == 5
     assert load_code("math:tau") == pytest.approx(6.283, abs=1e-3)
+
+
+def test_a_file_imports_modules_of_its_folder_but_they_replace_no_installed_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "gains_of_mine.py").write_text("stiff = 3000.0\n")
+    (tmp_path / "colorsys.py").write_text("raise RuntimeError('replaced')\n")
+    file = tmp_path / "mine.py"
+    file.write_text("import colorsys\nfrom gains_of_mine import stiff\n")
+    assert load_code(f"{file}:stiff") == 3000.0
 
 
 @pytest.mark.parametrize(
