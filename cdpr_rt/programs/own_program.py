@@ -41,8 +41,10 @@ class Program(ABC):
     arguments: Mapping[str, tuple[float, float, float]] = {}
     """Arguments of commands: the least and the largest allowed value, and the default."""
 
-    def begin(self, position: FloatArray, **arguments: float) -> None:  # noqa: B027  # optional
-        """Begin a run with the platform at a position (d,); all arguments are given.
+    def begin(  # noqa: B027  # optional
+        self, position: FloatArray, *_: Any, **arguments: Any
+    ) -> None:
+        """Begin a run with the platform at a position (d,); all arguments are given by name.
 
         Each run has its own copy of the program. If this raises, the command is rejected.
         """
