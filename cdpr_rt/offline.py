@@ -259,9 +259,10 @@ class Model:
         directions. It is -inf if the cables do not control a direction.
         """
         rows, shape = self._rows(position)
-        if not 0.0 <= acceleration_m_s2 < np.inf:
+        acceleration = _numbers("acceleration_m_s2", acceleration_m_s2)
+        if acceleration.shape or not 0.0 <= acceleration < np.inf:
             raise InvalidArgument(f"acceleration_m_s2: {acceleration_m_s2!r}; want a number from 0")
-        workspace = self._model.workspace(acceleration_m_s2, 0.0)
+        workspace = self._model.workspace(float(acceleration), 0.0)
         return workspace.capacity_margins(self._model.poses(rows)).reshape(shape)
 
     def is_feasible(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> BoolArray:

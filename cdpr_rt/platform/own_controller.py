@@ -57,8 +57,11 @@ class Target:
     """Commanded motion of the platform in this cycle. Arrays (d,) are overwritten in each cycle."""
 
     position: FloatArray
+    """Coordinates in m, then the rotation vector in rad."""
     velocity: FloatArray
+    """m/s and rad/s."""
     acceleration: FloatArray
+    """m/s2 and rad/s2."""
 
 
 class Controller(ABC):
