@@ -26,6 +26,7 @@ from cdpr_tools.imports.mapping import (
     CalibrationMapping,
     PoseColumns,
     read_time,
+    usable,
 )
 from cdpr_tools.imports.tables import Table
 
@@ -77,8 +78,9 @@ def import_calibration(
     model = platform_model_of(robot)
     table = read_any(cables)
     measured = read_poses(table if poses == cables else read_any(poses), mapping.pose)
-    time, lengths, tensions = _read_cables(table, mapping, len(robot.axes))
-    notes = _require_same_clock(mapping_path, time, lengths, measured, model)
+    notes: list[str] = []
+    time, lengths, tensions = _read_cables(table, mapping, len(robot.axes), notes)
+    notes += _require_same_clock(mapping_path, time, lengths, measured, model)
     row = _rows(time, measured, mapping)
     if row.size < _FEWEST:
         raise BadInputError(
@@ -137,7 +139,7 @@ def _reading(
 
 
 def _read_cables(
-    table: Table, mapping: CalibrationMapping, cables: int
+    table: Table, mapping: CalibrationMapping, cables: int, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Return times, lengths (rows, n), and tensions (rows, n) or None."""
     columns = mapping.cables
@@ -148,6 +150,7 @@ def _read_cables(
                 f"cables.{what}",
                 f"{len(given)} columns; allowed: {cables}, one for each cable",
             )
+    table = usable(table, columns.time, (*columns.lengths, *columns.tensions), notes)
     time = read_time(columns.time, table)
     lengths = np.column_stack([one.read_all(table, LENGTHS) for one in columns.lengths])
     if not columns.tensions:
@@ -157,6 +160,7 @@ def _read_cables(
 
 def read_poses(table: Table, columns: PoseColumns) -> Poses:
     """Return the poses in the room; skip rows with an empty cell, where the body was hidden."""
+    table = usable(table, columns.time, (), [])
     time = read_time(columns.time, table)
     to_room = _to_room(table, columns)
     position = np.column_stack([one.read(table, LENGTHS) for one in columns.position])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from pydantic import Field
 from cdpr_profiles import Winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reader import Profile
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_tools.imports.tables import Table
 
 _Finite = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -21,6 +21,8 @@ LENGTHS: Final = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0, "turns": math.tau}
 FORCES: Final = {"N": 1.0, "kN": 1e3, "kgf": 9.80665}
 NUMBERS: Final = {"": 1.0}
+_MOST_LATE: Final = 0.01
+"""Largest share of rows that are left out because their time does not increase."""
 
 
 class Column(Profile):
@@ -59,6 +61,37 @@ class Column(Profile):
             row = int(np.argmin(np.isfinite(values)))
             raise table.fault(self.name, row, "is empty; allowed: a number in every row")
         return values
+
+
+def usable(table: Table, time: Column | None, needed: Iterable[Column], notes: list[str]) -> Table:
+    """Return the rows with a number in each needed column, and with increasing times.
+
+    Adds a note for rows that are left out. If many times do not increase, no row is left out for
+    that; `read_time` then rejects the table.
+    """
+    filled = np.ones(table.lines.size, bool)
+    for column in (*([] if time is None else [time]), *needed):
+        filled &= np.isfinite(table.column(column.name))
+    if filled.any():
+        table = _kept(table, filled, "with an empty cell", notes)
+    if time is not None:
+        times = time.read(table, TIMES)
+        in_order = np.ones(times.size, bool)
+        in_order[1:] = times[1:] > np.fmax.accumulate(times)[:-1]
+        if np.count_nonzero(~in_order) <= _MOST_LATE * times.size:
+            table = _kept(table, in_order, "whose time does not increase", notes)
+    return table
+
+
+def _kept(table: Table, rows: BoolArray, why: str, notes: list[str]) -> Table:
+    count = int(np.count_nonzero(~rows))
+    if not count:
+        return table
+    first = int(table.lines[int(np.argmin(rows))])
+    notes.append(
+        f"{table.path}: left out {count} of {rows.size} rows {why}, the first in line {first}"
+    )
+    return table.some(rows)
 
 
 def read_time(column: Column, table: Table) -> FloatArray:

@@ -26,7 +26,7 @@ from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.imports.logs import read_any
-from cdpr_tools.imports.mapping import MotorColumns, MotorMapping, motor_units, read_time
+from cdpr_tools.imports.mapping import MotorColumns, MotorMapping, motor_units, read_time, usable
 from cdpr_tools.imports.tables import Table
 
 _LONGEST_STEP_S: Final = 2.5e-3
@@ -112,6 +112,7 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
     columns = mapping.columns
     angles, torques = motor_units(winch)
     assert columns.time is not None
+    table = usable(table, columns.time, (columns.angle, columns.torque), notes)
     time = read_time(columns.time, table)
     angle = columns.angle.read_all(table, angles)
     torque = columns.torque.read_all(table, torques)
@@ -301,8 +302,10 @@ def _import_maps(
     """Write static maps, torques at standstill, as passes `map` for `cdpr cogging compare`."""
     angles, torques = motor_units(winch)
     written, passes = [], []
+    notes: list[str] = []
     for k, path in enumerate(files):
         table = read_any(path, {"": winch})
+        table = usable(table, None, (mapping.columns.angle, mapping.columns.torque), notes)
         angle = mapping.columns.angle.read_all(table, angles)
         torque = mapping.columns.torque.read_all(table, torques)
         count = angle.size
@@ -314,4 +317,4 @@ def _import_maps(
         _write(to, "map", run, np.ones(count), _meta(table, mapping_path, winch, 1.0, 0.0))
         written.append(to)
         passes.append({"pass": to.name, "source": path.name, "samples": count})
-    return Imported(written, [], 0.0, passes)
+    return Imported(written, notes, 0.0, passes)

@@ -10,10 +10,12 @@ import csv
 import hashlib
 import io
 import math
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import islice, takewhile, zip_longest
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from itertools import chain, islice, takewhile, zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -21,7 +23,7 @@ import numpy as np
 
 from cdpr_profiles.bounded_input import read_bytes
 from cdpr_profiles.errors import ProfileError, brief, value_text
-from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 
 MOST_BYTES: Final = 1 << 28
 """Largest size of a recording by another program."""
@@ -33,6 +35,17 @@ _OPTITRACK: Final = "Format Version"
 _VICON: Final = ("Objects", "Segments", "Trajectories", "Joints", "Model Outputs")
 TIME: Final = "time_s"
 """Name of the column with the time in formats that contain frame numbers instead."""
+_NUMBER_FIRST: Final = re.compile(r"[\"']?\s*[-+]?[.,]?[0-9]")
+_DATE: Final = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]")
+_COMMENTS: Final = ("#", "%")
+_EMPTY: Final = frozenset(("na", "n/a", "#n/a", "null", "none", "-", "--"))
+"""Texts for a missing number, in lower case, besides nan and inf."""
+_UNITS: Final = frozenset((
+    "s", "sec", "ms", "us", "µs", "ns", "m", "cm", "mm", "rad", "deg", "°", "turns", "rev",
+    "counts", "nm", "mnm", "a", "a_rms", "a_peak", "ma", "n", "kn", "kgf", "%", "‰", "rad/s",
+    "deg/s", "rpm", "hz",
+))  # fmt: skip
+"""Units in a line below the names, in lower case."""
 _LENGTHS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 
@@ -48,6 +61,13 @@ class Table:
     columns: dict[str, FloatArray]
     lines: IntArray
     units: dict[str, str] = field(default_factory=dict)
+    faults: dict[str, ProfileError] = field(default_factory=dict)
+    """The first cell of each column that is not a number."""
+
+    def some(self, rows: BoolArray) -> Table:
+        """Return the table with the chosen rows only."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        return replace(self, columns=columns, lines=self.lines[rows])
 
     def column(self, name: str) -> FloatArray:
         """Return a column, (rows,); raises ProfileError with the names of all columns."""
@@ -57,6 +77,8 @@ class Table:
                 f"line {int(self.lines[0]) - 1}",
                 f"no column {name!r}; its columns: {brief(', '.join(self.columns))}",
             )
+        if name in self.faults:
+            raise self.faults[name]
         return self.columns[name]
 
     def fault(self, name: str, row: int, problem: str) -> ProfileError:
@@ -75,10 +97,7 @@ def read_table(path: Path) -> Table:
         return _read_optitrack(path, rows, digest)
     if first.rstrip(",;") in _VICON:
         return _read_vicon(path, rows, digest)
-    _, names = next(rows, (0, []))
-    if not names:
-        raise ProfileError(path, "", "contains no lines; allowed: a line of names, then numbers")
-    return _table(path, digest, names, rows, {})
+    return _read_csv(path, rows, digest, _last_comment(data, encoding))
 
 
 def _encoding(data: bytes) -> str:
@@ -93,24 +112,112 @@ def _encoding(data: bytes) -> str:
 
 def _lines(data: bytes, encoding: str) -> Iterator[tuple[int, str]]:
     """Yield number and text of each line that is neither empty nor a comment."""
+    for number, line in _all_lines(data, encoding):
+        if line.strip() and not line.lstrip().startswith(_COMMENTS):
+            yield number, line
+
+
+def _all_lines(data: bytes, encoding: str) -> Iterator[tuple[int, str]]:
     text = io.TextIOWrapper(io.BytesIO(data), encoding, errors="replace")
     for number, line in enumerate(text, 1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            yield number, line.rstrip("\n")
+        yield number, line.rstrip("\n")
+
+
+def _last_comment(data: bytes, encoding: str) -> str:
+    """Return the last comment in the first lines before a number: some programs write names so."""
+    found = ""
+    for _, line in islice(_all_lines(data, encoding), _SAMPLE_LINES):
+        text = line.strip()
+        if text.startswith(_COMMENTS):
+            found = text.lstrip("#% ")
+        elif text:
+            break
+    return found
 
 
 def _rows(path: Path, data: bytes, encoding: str) -> Iterator[_Row]:
-    """Yield the lines as cells, split at the delimiter that is most frequent in the names."""
-    kept = (line for _, line in islice(_lines(data, encoding), _SAMPLE_LINES))
-    # the names decide: decimal commas would outnumber semicolons
-    sample = next((line for line in kept if any(one in line for one in _DELIMITERS)), "")
-    delimiter = max(_DELIMITERS, key=sample.count)
+    """Yield the lines as cells, split at the delimiter of the names, or at spaces."""
+    delimiter = _delimiter([line for _, line in islice(_lines(data, encoding), _SAMPLE_LINES)])
     for number, line in _lines(data, encoding):
         try:
-            cells = next(csv.reader([line], delimiter=delimiter))
+            yield number, _split(line, delimiter)
         except csv.Error as error:
             raise ProfileError(path, f"line {number}", f"is not a CSV line: {error}") from None
-        yield number, [cell.strip() for cell in cells]
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line; raises csv.Error."""
+    cells = next(csv.reader([line], delimiter=delimiter)) if delimiter else line.split()
+    return [cell.strip() for cell in cells]
+
+
+def _delimiter(lines: list[str]) -> str:
+    """Return the delimiter that is most frequent in the line above the numbers, "" for spaces.
+
+    Decimal commas would outnumber semicolons in lines of numbers.
+    """
+    names = list(takewhile(lambda line: not _NUMBER_FIRST.match(line), lines))
+    for line in [*reversed(names), *lines]:
+        if any(one in line for one in _DELIMITERS):
+            return max(_DELIMITERS, key=line.count)
+    return ""
+
+
+def _cells(row: list[str]) -> list[str]:
+    """Return a line's cells without empty ones at its end."""
+    count = max((j for j, cell in enumerate(row, 1) if cell), default=0)
+    return row[:count]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return cell.lower() in _EMPTY or _DATE.match(cell) is not None
+    return True
+
+
+def _read_csv(path: Path, rows: Iterator[_Row], digest: str, comment: str) -> Table:
+    """Read a CSV file: a line of names, perhaps one of units, and rows of numbers.
+
+    Other lines may stand above. Without a line of names, a comment above the numbers may contain
+    them.
+    """
+    head: list[list[str]] = []
+    first: _Row | None = None
+    for line, row in rows:
+        cells = _cells(row)
+        numbers = sum(map(_is_number, cells))
+        alike = any(len(above) == len(cells) for above in head)
+        if 2 * numbers > len(cells) or (numbers and alike):
+            first = line, row
+            break
+        head.append(cells)
+        if len(head) > _SAMPLE_LINES:
+            break
+    if not head and first is None:
+        raise ProfileError(path, "", "contains no lines; allowed: a line of names, then numbers")
+    if first is None:
+        raise ProfileError(path, "", "contains no rows of numbers below the names")
+    width = len(_cells(first[1]))
+    named = [cells for cells in head if len(cells) >= width]
+    names, units = (named or [[]])[-1], {}
+    if len(named) > 1 and _are_units(names):
+        names, stated = named[-2], [cell.strip("[]() ") for cell in names]
+        units = {name: unit for name, unit in zip(names, stated, strict=False) if unit}
+    if not names:
+        names = _split(comment, _delimiter([comment])) if comment else []
+        if len(names) != width:
+            problem = "no line of names above the numbers; write one, such as time_s,angle,torque"
+            raise ProfileError(path, f"line {first[0]}", problem)
+    return _table(path, digest, names, chain([first], rows), units)
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Return whether most cells are units, perhaps in brackets."""
+    told = [cell.strip("[]() ").lower() for cell in cells if cell]
+    bracketed = sum(cell[:1] in "[(" for cell in cells if cell)
+    return 2 * max(sum(one in _UNITS for one in told), bracketed) > len(told)
 
 
 def _table(
@@ -122,18 +229,25 @@ def _table(
         problem = f"columns {sorted(twice)}; allowed: a different name for each column"
         raise ProfileError(path, "", problem)
     numbers, lines, read = array("d"), array("q"), _Numbers(path)
+    faults: dict[str, ProfileError] = {}
     for line, row in rows:
         if len(row) > len(names) and any(row[len(names) :]):
             problem = f"{len(row)} cells; allowed: up to {len(names)}, one for each column"
             raise ProfileError(path, f"line {line}", problem)
         lines.append(line)
         for name, cell in zip_longest(names, row[: len(names)], fillvalue=""):
-            numbers.append(read(line, name, cell) if cell else math.nan)
+            value = math.nan
+            if cell and name not in faults:
+                try:
+                    value = read(line, name, cell)
+                except ProfileError as fault:  # of no matter if the column is not used
+                    faults[name] = fault
+            numbers.append(value)
     if not lines:
         raise ProfileError(path, "", "contains no rows of numbers below the names")
     cells = np.array(numbers).reshape(len(lines), len(names))
     columns = {name: cells[:, j] for j, name in enumerate(names) if name}
-    return Table(path, digest, columns, np.array(lines), units)
+    return Table(path, digest, columns, np.array(lines), units, faults)
 
 
 class _Numbers:
@@ -144,7 +258,14 @@ class _Numbers:
         self._mark = ""
 
     def __call__(self, line: int, name: str, cell: str) -> float:
-        """Return a number, nan if it is not finite; raises ProfileError."""
+        """Return a number, or the time of day of a date in s; nan for a text such as NA.
+
+        Raises ProfileError.
+        """
+        if cell.lower() in _EMPTY:
+            return math.nan
+        if _DATE.match(cell):
+            return self._time_of_day(line, name, cell)
         mark = next((one for one in ".," if one in cell), self._mark)
         try:
             value = float(cell.replace(",", ".") if mark == "," else cell)
@@ -160,6 +281,14 @@ class _Numbers:
             )
         self._mark = mark
         return value if math.isfinite(value) else math.nan
+
+    def _time_of_day(self, line: int, name: str, cell: str) -> float:
+        try:
+            stamp = datetime.fromisoformat(cell)
+        except ValueError:
+            problem = f"value {value_text(cell)}; allowed: a date such as 2026-01-31T12:00:00.5Z"
+            raise ProfileError(self._path, f"line {line}: {name}", problem) from None
+        return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 
 def _head(rows: Iterator[_Row]) -> list[list[str]]:
@@ -222,4 +351,5 @@ def _read_vicon(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     units = {name: unit for name, unit in zip(names, stated, strict=False) if unit}
     table = _table(path, digest, names, block, units)
     seconds = (table.columns["Frame"] - 1.0) / rate
-    return Table(path, digest, {TIME: seconds, **table.columns}, table.lines, units | {TIME: "s"})
+    columns = {TIME: seconds, **table.columns}
+    return replace(table, columns=columns, units=units | {TIME: "s"})

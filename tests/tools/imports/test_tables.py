@@ -74,12 +74,32 @@ def test_a_vicon_export_has_columns_by_body_and_time_from_frames(tmp_path: Path)
         "t;a;µ\n0;1;\n1;2;\n".encode("latin-1"),
         "t\ta\r\n0,0\t1,0\r\n1\t2\r\n".encode("utf-16"),
         "t;a\r0;1,0\r1;2,0\r",
+        "# t a\n0.0 1.0\n1.0 2.0\n",
+        "% t,a\n0,1\n1,2\n",
+        "Recording of 3 May, 2026\nRate;100 Hz\n\nt;a\n0;1,0\n1;2,0\n",
+        "t,a\n[s],[Nm]\n0,1\n1,2\n",
+        "t,a,state\n0,1,RUN\n1,2,STOP\n",
     ],
 )
 def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -> None:
     table = read_table(written(tmp_path, text))
     assert list(table.column("t")) == [0.0, 1.0]
     assert list(table.column("a")) == [1.0, 2.0]
+
+
+def test_a_line_of_units_states_the_units(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, "time,pos,iq\ns,deg,A_rms\n0,1,2\n"))
+    assert table.units == {"time": "s", "pos": "deg", "iq": "A_rms"}
+
+
+def test_texts_for_missing_numbers_are_empty_cells(tmp_path: Path) -> None:
+    text = "t,a\n0,1\n1,NA\n2,null\n3,--\n4,nan\n5,\n"
+    assert np.isnan(read_table(written(tmp_path, text)).column("a")[1:]).all()
+
+
+def test_dates_become_seconds(tmp_path: Path) -> None:
+    text = "t,a\n2026-01-31T12:00:00.5Z,1\n2026-01-31 12:00:01.75,2\n"
+    assert np.diff(read_table(written(tmp_path, text)).column("t")) == pytest.approx([1.25])
 
 
 @pytest.mark.parametrize(
@@ -89,6 +109,8 @@ def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -
         ("a,b\n", "contains no rows"),
         ("t;a\n0,1;1,5\n0,2;2.5\n", "line 3: a: value '2.5': earlier numbers have ','"),
         ("t;a\n0;1,234.5\n", "line 2: a: value '1,234.5'; allowed: a number"),
+        ("0,1\n1,2\n", "line 1: no line of names above the numbers; write one"),
+        ("t,a\n0,1\n1,RUN\n", "line 3: a: value 'RUN'; allowed: a number"),
         ("a,a\n1,2\n", "a different name for each column"),
         ("Format Version,1.2\nFrame,Time\n0,0\n", "export from Motive with all header rows"),
         ("Segments\nfast\n,,a\nFrame,Sub Frame,RX\n,,rad\n1,0,1\n", "the rate in Hz"),
@@ -96,4 +118,4 @@ def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -
 )
 def test_a_broken_export_is_rejected(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ProfileError, match=message):
-        read_table(written(tmp_path, text))
+        read_table(written(tmp_path, text)).column("a")
