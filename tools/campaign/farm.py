@@ -16,6 +16,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -24,6 +25,7 @@ from cdpr_rt.robot import Error
 from cdpr_tools.campaign.judge import Result, judge, predicted
 from cdpr_tools.campaign.play import STARTS, Played, Player, RobotAtStart, output_to
 from cdpr_tools.campaign.scenario import Scenario
+from cdpr_tools.daemon.child import end_with_launcher
 from cdpr_tools.processes import module_command
 
 _SEED_CPU_S: Final = 90
@@ -33,6 +35,7 @@ _SEED_S: Final = 900.0
 DID_NOT_START: Final = "did not start"
 _OUTPUT: Final = "output.txt"
 _AT_MOST: Final = 4000
+_INTERRUPTED: Final = 130
 
 
 @dataclass(frozen=True)
@@ -84,12 +87,20 @@ def _result(data: dict[str, Any]) -> Result:
 
 def _serve() -> None:
     """Run the jobs that arrive on standard input, one a line, until it ends."""
+    _end_with(os.getppid())
     out = os.dup(1)
     os.dup2(2, 1)  # nothing but results may go to the caller
-    for line in sys.stdin:
-        given = [Scenario(**one) for one in json.loads(line)]
-        found = run_scenarios(given)
-        os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
+    with suppress(KeyboardInterrupt):
+        for line in sys.stdin:
+            given = [Scenario(**one) for one in json.loads(line)]
+            found = run_scenarios(given)
+            os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
+
+
+def _end_with(parent: int) -> None:
+    """End as by an interrupt, which removes temporary files, when the parent ends."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    end_with_launcher(parent)
 
 
 # Forks.
@@ -210,13 +221,17 @@ class _Lines:
 def _in_fork(work: Callable[[int], None], within_s: float) -> _Lines:
     """Run `work` in a fork; it writes its results to a descriptor."""
     inner, outer = os.pipe()
+    parent = os.getpid()
     pid = os.fork()
     if not pid:
         os.close(inner)
         status = 1
         try:
+            _end_with(parent)
             work(outer)
             status = 0
+        except KeyboardInterrupt:
+            status = _INTERRUPTED
         except BaseException:
             traceback.print_exc()
         finally:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +23,7 @@ from cdpr_tools.campaign.farm import Seeds, run_alone
 from cdpr_tools.campaign.judge import INVARIANTS, judge
 from cdpr_tools.campaign.play import Played, Player, RobotAtStart
 from cdpr_tools.campaign.scenario import BEFORE_BOOT, DRAWN, READY, TIGHT, Scenario
+from cdpr_tools.processes import module_command
 
 ROBOT = "planar-3"
 NOTHING = Scenario(0, ROBOT, {}, READY, ({"do": "enable", "wait_s": 0.1},), (), False, False)
@@ -145,6 +150,28 @@ def test_each_invariant_finds_its_violation(invariant: str, day: tuple[Played, R
     played, robot = day
     violations = judge(_TAMPERED[invariant](played), robot).violations
     assert invariant in {violation.partition(":")[0] for violation in violations}
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_campaign_that_is_ended_leaves_no_processes_and_files(how: int, tmp_path: Path) -> None:
+    command = module_command("cdpr_tools.cli", "sim", "campaign", ROBOT, "--seeds", "2")
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [*command, "--workers", "1"], env=environment, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    ) as campaign:  # fmt: skip
+        _wait_until(lambda: any(tmp_path.glob("cdpr-campaign-*/plant.toml")))
+        os.killpg(campaign.pid, how) if how == signal.SIGINT else campaign.kill()
+        said, _ = campaign.communicate(timeout=60.0)  # until no process has the pipe
+    assert "Traceback" not in said
+    assert not list(tmp_path.glob("cdpr-campaign-*"))
+
+
+def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
+    end_s = time.monotonic() + within_s
+    while not done():
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
 
 
 @pytest.mark.long
