@@ -168,7 +168,7 @@ class StateMachine:
             self.state = State.QUICK_STOP_ACTIVE
             stays = option >= 5
             self._brake(option - 4 if stays else option)
-            self._stop_to = None if stays else State.SWITCH_ON_DISABLED
+            self._end_stop(None if stays else State.SWITCH_ON_DISABLED)
 
     def _shut_down(self) -> None:
         if self.state is State.SWITCH_ON_DISABLED and not self.power_allowed:
@@ -202,7 +202,7 @@ class StateMachine:
         if self.axis.object(option_object) == 0:
             self._enter(state)
         else:
-            self._stop_to = state
+            self._end_stop(state)
             self._brake(1)
 
     def _enable(self) -> None:
@@ -220,6 +220,11 @@ class StateMachine:
         if state in _COASTING:
             self._halted = False
             self.axis.switch_off()
+
+    def _end_stop(self, state: State | None) -> None:
+        """Enter a state when the motor rests, or when that takes too long."""
+        self._stop_to = state
+        self._reaction_due = self.axis.time + _REACTION_LIMIT_S
 
     def _halt(self, halt: bool) -> None:
         if halt == self._halted:
@@ -284,8 +289,7 @@ class StateMachine:
         else:
             self.state = State.FAULT_REACTION_ACTIVE
             self._brake(option)
-            self._stop_to = State.FAULT
-            self._reaction_due = self.axis.time + _REACTION_LIMIT_S
+            self._end_stop(State.FAULT)
         self._slave.emergency(code, error_register_bits(code))
         self.update()
 

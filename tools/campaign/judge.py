@@ -19,8 +19,11 @@ from cdpr_tools.campaign.play import Played
 from cdpr_tools.campaign.scenario import BEFORE_BOOT
 
 _TORQUE_Nm: Final = 1e-3
-_DEAD_WITHIN_S: Final = 1.5
-"""Longest time of the drives until they are without power, after their master has died."""
+_DEAD_WITHIN_S: Final = 3.0
+"""Longest time of the drives until they are without power, after their master has died.
+
+Those that do not detect their standstill end a quick stop after 2 s.
+"""
 _FELL_m: Final = 0.05
 _OVER: Final = 1.25
 _RISE_MB: Final = 150.0

@@ -30,7 +30,7 @@ from cdpr_tools.recordings.pose_log import read_pose_log
 _TIGHTEN_S: Final = 120.0
 _SETTLE_S: Final = 30.0
 _AFTER_S: Final = 0.3
-_DEAD_S: Final = 2.0
+_DEAD_S: Final = 3.2
 _REPLY_S: Final = 60.0
 _LOOK_CYCLES: Final = 5
 _STREAM_Hz: Final = 50.0

@@ -130,6 +130,19 @@ def test_fault_reaction_options_stop_the_motor_as_specified(option: int) -> None
         assert way == pytest.approx(30.7**2 / 2 / 628.3, rel=0.15)
 
 
+def test_a_quick_stop_ends_even_if_encoder_noise_hides_the_standstill() -> None:
+    rig = rig_with(encoder={"noise_counts": 100.0})
+    rig.enable(10)
+    rig.word = 0x0002
+    rig.cycles(5)
+    rig.run(1.0)
+    rig.cycle()
+    assert rig.status & 0x6F == 0x07
+    rig.run(1.5)
+    rig.cycle()
+    assert rig.status & 0x4F == SOD
+
+
 def test_reset_needs_a_rising_edge_of_bit_7() -> None:
     rig = Rig()
     rig.map_pdos()
