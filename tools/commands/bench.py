@@ -13,7 +13,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.errors import printable
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robot import Error as RobotError
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, option
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, raised_as
 from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
@@ -21,10 +21,6 @@ from cdpr_tools.output import Output
 app = typer.Typer(
     name="bench", help="Measure the cost of this software on this machine.", no_args_is_help=True
 )
-
-
-def _option(text: str, least: float, most: float | None = None, **more: Any) -> Any:
-    return typer.Option(min=least, max=most, help=text, **more)
 
 
 def _run(bench: str, as_json: bool, **given: Any) -> None:
@@ -44,9 +40,11 @@ def _run(bench: str, as_json: bool, **given: Any) -> None:
 
 @app.command()
 def api(
-    starts: Annotated[int, _option("First moves of a new script.", 1)] = 5,
-    cycles: Annotated[int, _option("Cycles in lockstep with each controller.", 200)] = 4_000,
-    seconds: Annotated[float, _option("Duration at 250 Hz with each controller.", 3, 3600)] = 20.0,
+    starts: Annotated[int, option("First moves of a new script.", min=1)] = 5,
+    cycles: Annotated[int, option("Cycles in lockstep with each controller.", min=200)] = 4_000,
+    seconds: Annotated[
+        float, option("Duration at 250 Hz with each controller.", min=3, max=3600)
+    ] = 20.0,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the Python interface: a script's first move, and controllers written in Python.
@@ -60,7 +58,7 @@ def api(
 
 @app.command()
 def bus(
-    exchanges: Annotated[int, _option("Exchanges of 8 frames out and 8 in, each way.", 1)] = 500,
+    exchanges: Annotated[int, option("Exchanges of 8 frames out and 8 in, each way.", min=1)] = 500,
     as_json: JsonOption = False,
 ) -> None:
     """Measure frames per second and host cost per frame, beside plain python-can.
@@ -73,8 +71,8 @@ def bus(
 
 @app.command()
 def control(
-    robot: Annotated[str, typer.Option(help="A robot with a platform.")] = "spatial-8",
-    cycles: Annotated[int, _option("Updates of each implementation.", 500)] = 5_000,
+    robot: Annotated[str, option("A robot with a platform.")] = "spatial-8",
+    cycles: Annotated[int, option("Updates of each implementation.", min=500)] = 5_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure one update of a platform's control: pose, wrench, tensions, torques.
@@ -87,7 +85,7 @@ def control(
 
 @app.command()
 def cycle(
-    cycles: Annotated[int, _option("Exchanges each way.", 1)] = 10_000,
+    cycles: Annotated[int, option("Exchanges each way.", min=1)] = 10_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure one exchange with 8 axes: ours, and the canopen package's PDO path.
@@ -99,7 +97,7 @@ def cycle(
 
 @app.command()
 def kinematics(
-    poses: Annotated[int, _option("Poses of each kind.", 100)] = 1_000,
+    poses: Annotated[int, option("Poses of each kind.", min=100)] = 1_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the pose from cable lengths: along a path, and from bad starts.
@@ -112,11 +110,11 @@ def kinematics(
 
 @app.command()
 def latency(
-    seconds: Annotated[float, _option("Duration of each of the four curves.", 0.1, 86_400)] = 5.0,
-    rate: Annotated[float, _option("Cycles per second.", 1, 10_000)] = 1000.0,
-    picture: Annotated[Path, typer.Option("--out", help="File for the picture.")] = Path(
-        "out/latency.png"
-    ),
+    seconds: Annotated[
+        float, option("Duration of each of the four curves.", min=0.1, max=86_400)
+    ] = 5.0,
+    rate: Annotated[float, option("Cycles per second.", min=1, max=10_000)] = 1000.0,
+    picture: Annotated[Path, option("File for the picture.", "--out")] = Path("out/latency.png"),
     as_json: JsonOption = False,
 ) -> None:
     """Measure how late a loop wakes up, with and without the real-time settings, as a picture.
@@ -128,12 +126,11 @@ def latency(
 
 @app.command()
 def loop(
-    seconds: Annotated[float, _option("Duration of each variant.", 3, 3600)] = 30.0,
+    seconds: Annotated[float, option("Duration of each variant.", min=3, max=3600)] = 30.0,
     robot: Annotated[
         str,
-        typer.Option(
-            help="Robot profile, whose platform is moved to and fro. Default: axes without a "
-            "platform."
+        option(
+            "Robot profile, whose platform is moved to and fro. Default: axes without a platform."
         ),
     ] = "",
     as_json: JsonOption = False,
@@ -148,8 +145,8 @@ def loop(
 
 @app.command()
 def page(
-    seconds: Annotated[float, _option("Duration of each case.", 3, 3600)] = 60.0,
-    hours: Annotated[float, _option("Hours of messages that a page gets.", 0.1, 1000)] = 8.0,
+    seconds: Annotated[float, option("Duration of each case.", min=3, max=3600)] = 60.0,
+    hours: Annotated[float, option("Hours of messages that a page gets.", min=0.1, max=1000)] = 8.0,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the robot's page in Chromium: start, rate, cost, 50 open pages, memory.
@@ -161,18 +158,17 @@ def page(
 
 @app.command()
 def soak(
-    hours: Annotated[float, _option("Hours of bus time.", 1e-4, 1e4)] = 1.0,
+    hours: Annotated[float, option("Hours of bus time.", min=1e-4, max=1e4)] = 1.0,
     wall_minutes: Annotated[
         float,
-        _option("End after this many minutes, even before --hours.", 0.01,
-                show_default=False),
+        option("End after this many minutes, even before --hours.", min=0.01, show_default=False),
     ] = math.inf,
-    robot: Annotated[str, typer.Option(help="Robot profile: a name or a path.")] = "bench-8",
+    robot: Annotated[str, option("Robot profile: a name or a path.")] = "bench-8",
     rate: Annotated[
-        float | None, _option("Cycles per second, instead of the robot's.", 1, 10_000)
+        float | None, option("Cycles per second, instead of the robot's.", min=1, max=10_000)
     ] = None,
     as_json: JsonOption = False,
-) -> None:  # fmt: skip
+) -> None:
     """Move a simulated robot in lockstep for hours, and watch for leaked memory and lost frames.
 
     The exit status is 1 if memory leaks or a frame is lost.
@@ -183,12 +179,10 @@ def soak(
 
 @app.command()
 def stop(
-    stops: Annotated[int, _option("Stops of each kind.", 1, 100_000)] = 500,
+    stops: Annotated[int, option("Stops of each kind.", min=1, max=100_000)] = 500,
     from_page: Annotated[
         bool,
-        typer.Option(
-            "--page", help="Press the page's stop in Chromium while motors turn, and watch the bus."
-        ),
+        option("Press the page's stop in Chromium while motors turn, and watch the bus.", "--page"),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -201,7 +195,7 @@ def stop(
 
 @app.command()
 def tension(
-    poses: Annotated[int, _option("Poses of each robot.", 500)] = 10_000,
+    poses: Annotated[int, option("Poses of each robot.", min=500)] = 10_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure tension distribution on poses of spatial-8 and suspended-8, feasible or not.

@@ -41,7 +41,8 @@ from cdpr_tools.busview.scan import (
     responding,
     signs_of_a_master,
 )
-from cdpr_tools.commands.options import JsonOption, RobotOrWinchArgument, YesOption
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BAD_INPUT, WorkFailedError
 from cdpr_tools.output import Output, TableText
@@ -56,39 +57,35 @@ _LATE_S = 0.05
 
 
 _ProfileOption = Annotated[
-    str | None, typer.Option("--profile", help="Decode every node as this drive.", metavar="DRIVE")
+    str | None, option("Decode every node as this drive.", "--profile", metavar="DRIVE")
 ]
 _WinchOption = Annotated[
-    str | None, typer.Option("--winch", help="Decode the node of this winch, with its ratings.")
+    str | None, option("Decode the node of this winch, with its ratings.", "--winch")
 ]
 _RobotOption = Annotated[
-    str | None,
-    typer.Option("--robot", help="Decode this robot's nodes; ROBOT:BUS for one of its buses."),
+    str | None, option("Decode this robot's nodes; ROBOT:BUS for one of its buses.", "--robot")
 ]
 _IdsOption = Annotated[
-    str | None,
-    typer.Option("--ids", help="Only these identifiers, hexadecimal: 181,700-77F", metavar="IDS"),
+    str | None, option("Only these identifiers, hexadecimal: 181,700-77F", "--ids", metavar="IDS")
 ]
-_RawOption = Annotated[bool, typer.Option("--raw", help="Print candump lines, undecoded.")]
+_RawOption = Annotated[bool, option("Print candump lines, undecoded.", "--raw")]
 
 
 @app.command()
 def monitor(
-    bus: Annotated[
-        str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
-    ],
+    bus: Annotated[str, option("simbus:NAME, socketcan:can0, ...", "--bus", metavar="URL")],
     profile: _ProfileOption = None,
     winch: _WinchOption = None,
     robot: _RobotOption = None,
     ids: _IdsOption = None,
     log: Annotated[
-        Path | None, typer.Option("--log", help="Log all frames to this file, in candump format.")
+        Path | None, option("Log all frames to this file, in candump format.", "--log")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.1, help="End after this many seconds.")
+        float | None, option("End after this many seconds.", "--seconds", min=0.1)
     ] = None,
     raw: _RawOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the decoded traffic of a bus until Ctrl-C; only listens."""
     out = Output(as_json)
@@ -115,29 +112,29 @@ def monitor(
 @app.command()
 def replay(
     file: Annotated[
-        Path, typer.Argument(help="Log of candump, or another that python-can reads; - for stdin.")
+        Path, argument("Log of candump, or another that python-can reads; - for stdin.")
     ],
     profile: _ProfileOption = None,
     winch: _WinchOption = None,
     robot: _RobotOption = None,
     ids: _IdsOption = None,
     channel: Annotated[
-        str | None, typer.Option("--channel", help="Which bus, if the file contains several.")
+        str | None, option("Which bus, if the file contains several.", "--channel")
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Speed factor of the replay; by default 1 with --to, else without waiting.",
             "--speed",
             min=0.001,
-            help="Speed factor of the replay; by default 1 with --to, else without waiting.",
         ),
     ] = None,
     to: Annotated[
-        str | None, typer.Option("--to", help="Also send all frames to this bus.", metavar="URL")
+        str | None, option("Also send all frames to this bus.", "--to", metavar="URL")
     ] = None,
     raw: _RawOption = False,
-    yes: YesOption = False,
-    as_json: JsonOption = False,
+    yes: options.YesOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show a recorded session as the monitor does, or send it to a bus again."""
     out = Output(as_json)
@@ -198,19 +195,17 @@ def _show(out: Output, summary: Summary) -> None:
 
 @app.command()
 def scan(
-    bus: Annotated[
-        list[str], typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
-    ],
+    bus: Annotated[list[str], option("simbus:NAME, socketcan:can0, ...", "--bus", metavar="URL")],
     nodes: Annotated[
-        str, typer.Option("--nodes", help="Node ids to ask, such as 1-127 or 1,5,20-23.")
+        str, option("Node ids to ask, such as 1-127 or 1,5,20-23.", "--nodes")
     ] = "1-127",
     profiles: Annotated[
-        Path | None, typer.Option("--profiles", help="Folder with drive profiles of your own.")
+        Path | None, option("Folder with drive profiles of your own.", "--profiles")
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Scan even while another master makes SDO transfers.")
+        bool, option("Scan even while another master makes SDO transfers.", "--force")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List the nodes on one or several buses: state, identity, modes, profile; reads only."""
     out = Output(as_json)
@@ -262,12 +257,11 @@ _LOW, _HIGH = 1.0, 10_000.0
 
 @app.command()
 def budget(
-    machine: RobotOrWinchArgument,
+    machine: options.RobotOrWinchArgument,
     rate: Annotated[
-        float | None,
-        typer.Option(min=_LOW, max=_HIGH, help="Cycles per second, instead of the profile's."),
+        float | None, option("Cycles per second, instead of the profile's.", min=_LOW, max=_HIGH)
     ] = None,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute the worst-case time of the cycle on each bus, the highest rate, and the time left.
 

@@ -12,18 +12,8 @@ import typer
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration_in_force import undo as take_back
 from cdpr_tools.client.client import Daemon, open_daemon
-from cdpr_tools.commands.options import (
-    ClusterOption,
-    HandEyeOption,
-    JsonOption,
-    KeyFileOption,
-    OverwriteOption,
-    PngOption,
-    RobotArgument,
-    SeedOption,
-    SocketOption,
-    UrlOption,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.loading import loading_notice
@@ -39,90 +29,90 @@ if TYPE_CHECKING:
 
 PointsOption = Annotated[
     Path | None,
-    typer.Option(
-        help="Measured positions, CSV with the columns pose (from 1), x_mm, y_mm, z_mm, sigma_mm.",
+    option(
+        "Measured positions, CSV with the columns pose (from 1), x_mm, y_mm, z_mm, sigma_mm.",
         metavar="FILE",
     ),
 ]
 IdentifyOption = Annotated[
     str | None,
-    typer.Option(
-        help="Parameters to identify, separated by commas: exit, offset, drum, elongation "
+    option(
+        "Parameters to identify, separated by commas: exit, offset, drum, elongation "
         "(these by default), anchor, pulley.",
         metavar="LIST",
     ),
 ]
 KnownMmOption = Annotated[
     float | None,
-    typer.Option(
-        "--known-mm", min=0.1, max=500.0,
-        help="Standard deviation of the exit points in the robot's file, mm; default 50, as "
+    option(
+        "Standard deviation of the exit points in the robot's file, mm; default 50, as "
         "measured with a tape.",
+        "--known-mm",
+        min=0.1,
+        max=500.0,
     ),
-]  # fmt: skip
+]
 KnownDrumOption = Annotated[
     float | None,
-    typer.Option(
-        "--known-drum-percent", min=0.001, max=50.0,
-        help="Standard deviation of the cable that a turn of a drum pays out by its file, %; "
+    option(
+        "Standard deviation of the cable that a turn of a drum pays out by its file, %; "
         "default 0.5.",
+        "--known-drum-percent",
+        min=0.001,
+        max=50.0,
     ),
-]  # fmt: skip
+]
 LengthNoiseOption = Annotated[
     float | None,
-    typer.Option(
-        "--length-noise-mm", min=0.001, max=100.0,
-        help="Standard deviation of a cable length by its encoder, mm; default: estimated from the "
+    option(
+        "Standard deviation of a cable length by its encoder, mm; default: estimated from the "
         "data, at least 0.3.",
+        "--length-noise-mm",
+        min=0.001,
+        max=100.0,
     ),
-]  # fmt: skip
+]
 WantedMmOption = Annotated[
     float | None,
-    typer.Option(
-        "--wanted-mm", min=0.01, max=1000.0,
-        help="Largest allowed uncertainty of positions, mm (3 sigma); default: held-out poses "
+    option(
+        "Largest allowed uncertainty of positions, mm (3 sigma); default: held-out poses "
         "must improve, and their errors must be as predicted.",
+        "--wanted-mm",
+        min=0.01,
+        max=1000.0,
     ),
-]  # fmt: skip
-CalibrationPlantOption = Annotated[
-    Path | None,
-    typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
 ]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Report the result; adopt nothing.")]
+CalibrationPlantOption = Annotated[
+    Path | None, option("Plant file: the truth about robot, cables, motors and camera.")
+]
+DryRunOption = Annotated[bool, option("Report the result; adopt nothing.", "--dry-run")]
 AdoptOption = Annotated[
-    bool,
-    typer.Option("--adopt", help="Adopt it even if its changes are not significant."),
+    bool, option("Adopt it even if its changes are not significant.", "--adopt")
 ]
 PosesOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="N|FILE",
-        help="Number of poses including home, or a list written by `cdpr poses`. Default: "
+    option(
+        "Number of poses including home, or a list written by `cdpr poses`. Default: "
         "up to 100, as long as more poses improve the result.",
+        metavar="N|FILE",
     ),
 ]
 ScannerOption = Annotated[
-    bool, typer.Option("--scanner", help="Measure the poses with the simulated scanner.")
+    bool, option("Measure the poses with the simulated scanner.", "--scanner")
 ]
 OutDirOption = Annotated[
     Path | None,
-    typer.Option(
-        "--out", help="Folder for data, images, result and report; default out/calibrate-ROBOT."
-    ),
+    option("Folder for data, images, result and report; default out/calibrate-ROBOT.", "--out"),
 ]
 CameraUrlOption = Annotated[
-    str | None,
-    typer.Option("--camera", help="Camera on the platform, such as opencv:0.", metavar="CAMERA"),
+    str | None, option("Camera on the platform, such as opencv:0.", "--camera", metavar="CAMERA")
 ]
 IntrinsicsOption = Annotated[
-    Path | None,
-    typer.Option(help="Intrinsics of the camera; needed for the first pose.", metavar="FILE"),
+    Path | None, option("Intrinsics of the camera; needed for the first pose.", metavar="FILE")
 ]
 MarkersOption = Annotated[
     Path | None,
-    typer.Option(
-        help="File with the sizes of the sheets; needed for the first pose.", metavar="FILE"
-    ),
+    option("File with the sizes of the sheets; needed for the first pose.", metavar="FILE"),
 ]
 
 
@@ -167,14 +157,13 @@ def measure(
     out: Output,
     camera: CameraUrlOption = None,
     ask: Annotated[
-        bool,
-        typer.Option("--ask", help="Ask at each pose for the measured position of the platform."),
+        bool, option("Ask at each pose for the measured position of the platform.", "--ask")
     ] = False,
     poses: PosesOption = None,
     intrinsics: IntrinsicsOption = None,
     markers: MarkersOption = None,
-    hand_eye: HandEyeOption = None,
-    seed: SeedOption = 1,
+    hand_eye: options.HandEyeOption = None,
+    seed: options.SeedOption = 1,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
     out_dir: OutDirOption = None,
@@ -245,9 +234,7 @@ _ENOUGH = 15
 def read(
     daemon: Daemon,
     out: Output,
-    out_dir: Annotated[
-        Path, typer.Option("--out", help="Folder of the poses; the first pose creates it.")
-    ],
+    out_dir: Annotated[Path, option("Folder of the poses; the first pose creates it.", "--out")],
     camera: CameraUrlOption = None,
     intrinsics: IntrinsicsOption = None,
     markers: MarkersOption = None,
@@ -295,24 +282,21 @@ app.command()(measure)
 
 @app.command(name="fit")
 def fit_data(
-    robot: RobotArgument,
-    data: Annotated[
-        Path,
-        typer.Option(help="Folder of a run, or its data.json.", metavar="FOLDER|FILE"),
-    ],
+    robot: options.RobotArgument,
+    data: Annotated[Path, option("Folder of a run, or its data.json.", metavar="FOLDER|FILE")],
     points: PointsOption = None,
-    hand_eye: HandEyeOption = None,
+    hand_eye: options.HandEyeOption = None,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
     drum_percent: KnownDrumOption = None,
     length_mm: LengthNoiseOption = None,
     wanted_mm: WantedMmOption = None,
     out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the result; default that of --data.")
+        Path | None, option("Folder for the result; default that of --data.", "--out")
     ] = None,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Identify from poses measured before, as at the end of a run; nothing moves.
 
@@ -343,16 +327,16 @@ def fit_data(
 
 @app.command()
 def run(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     camera: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Use the camera on the platform; the default for platforms with six directions.",
             "--camera",
-            help="Use the camera on the platform; the default for platforms with six directions.",
         ),
     ] = False,
     redundancy: Annotated[
-        bool, typer.Option("--redundancy", help="Use only encoder lengths and tensions.")
+        bool, option("Use only encoder lengths and tensions.", "--redundancy")
     ] = False,
     scanner: ScannerOption = False,
     points: PointsOption = None,
@@ -360,30 +344,27 @@ def run(
     plant: CalibrationPlantOption = None,
     intrinsics: Annotated[
         Path | None,
-        typer.Option(
-            help="Intrinsics of the camera; by default calibrated with a board first.",
-            metavar="FILE",
+        option(
+            "Intrinsics of the camera; by default calibrated with a board first.", metavar="FILE"
         ),
     ] = None,
     markers: Annotated[
         Path | None,
-        typer.Option(
-            help="File with sizes and known places of the sheets; by default those of the plant.",
+        option(
+            "File with sizes and known places of the sheets; by default those of the plant.",
             metavar="FILE",
         ),
     ] = None,
-    hand_eye: HandEyeOption = None,
-    seed: SeedOption = 1,
+    hand_eye: options.HandEyeOption = None,
+    seed: options.SeedOption = 1,
     identify: IdentifyOption = None,
     known_mm: KnownMmOption = None,
     out_dir: OutDirOption = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue a run that ended early.")
-    ] = False,
-    overwrite: OverwriteOption = False,
+    resume: Annotated[bool, option("Continue a run that ended early.", "--resume")] = False,
+    overwrite: options.OverwriteOption = False,
     dry_run: DryRunOption = False,
     adopt: AdoptOption = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Move a simulated robot through poses, read its cables, identify, verify, adopt.
 
@@ -454,10 +435,10 @@ def run(
 
 def _require_as_begun(given: Mapping[str, object]) -> None:
     """Raise BadInputError for options that only a new run accepts."""
-    for option, value in given.items():
+    for name, value in given.items():
         if value:
             raise BadInputError(
-                f"{option}: not with --resume, which continues with the options of the run"
+                f"{name}: not with --resume, which continues with the options of the run"
             )
 
 
@@ -484,28 +465,26 @@ def _require_new(folder: Path, name: str, overwrite: bool) -> None:
 
 @app.command()
 def check(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     scanner: ScannerOption = False,
     plant: CalibrationPlantOption = None,
     running: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Check the robot that a daemon runs; its platform must be tight and at home.",
             "--running",
-            help="Check the robot that a daemon runs; its platform must be tight and at home.",
         ),
     ] = False,
     camera: CameraUrlOption = None,
-    seed: SeedOption = 1,
+    seed: options.SeedOption = 1,
     out_dir: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="Folder for the readings (check.json); default out/check-ROBOT."
-        ),
+        option("Folder for the readings (check.json); default out/check-ROBOT.", "--out"),
     ] = None,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
-    as_json: JsonOption = False,
+    socket: options.SocketOption = None,
+    url: options.UrlOption = None,
+    key_file: options.KeyFileOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Move a calibrated robot to ten poses and report whether it has changed.
 
@@ -537,7 +516,7 @@ def check(
 
 
 @app.command()
-def undo(robot: RobotArgument, as_json: JsonOption = False) -> None:
+def undo(robot: options.RobotArgument, as_json: options.JsonOption = False) -> None:
     """Undo the calibration in force; the previous one, or the robot's file, applies again.
 
     A running robot is not affected until its next start.
@@ -561,13 +540,13 @@ def undo(robot: RobotArgument, as_json: JsonOption = False) -> None:
 @app.command()
 def study(
     robot: Annotated[
-        str, typer.Argument(help="A robot whose platform has six directions.", metavar="ROBOT")
+        str, argument("A robot whose platform has six directions.", metavar="ROBOT")
     ] = "spatial-8",
-    draws: Annotated[int, typer.Option(min=2, max=100_000, help="Trials of each case.")] = 200,
-    seed: SeedOption = 1,
-    png: PngOption = None,
-    cluster: ClusterOption = None,
-    as_json: JsonOption = False,
+    draws: Annotated[int, option("Trials of each case.", min=2, max=100_000)] = 200,
+    seed: options.SeedOption = 1,
+    png: options.PngOption = None,
+    cluster: options.ClusterOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show how measurement errors become errors of the geometry, by a model and by trial.
 

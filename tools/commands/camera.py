@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cdpr_drivers.camera.camera import Camera, open_camera
 from cdpr_rt.calibration.markers.detection import Board, IntrinsicsFit, fit_intrinsics
 from cdpr_rt.core.clock import PacedClock
-from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption
+from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption, argument, option
 from cdpr_tools.errors import WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import require_free, save
@@ -27,15 +27,15 @@ app = typer.Typer(
 def grab(
     camera: Annotated[
         str,
-        typer.Argument(
-            help="opencv:0, opencv:rtsp://..., genicam:PRODUCER.cti, sim:SOCKET, folder:DIR.",
+        argument(
+            "opencv:0, opencv:rtsp://..., genicam:PRODUCER.cti, sim:SOCKET, folder:DIR.",
             metavar="CAMERA",
         ),
     ],
-    folder: Annotated[Path, typer.Option("--out", help="Folder for the images.")],
-    count: Annotated[int, typer.Option(min=1, max=10000, help="Number of images.")] = 1,
+    folder: Annotated[Path, option("Folder for the images.", "--out")],
+    count: Annotated[int, option("Number of images.", min=1, max=10000)] = 1,
     interval_s: Annotated[
-        float, typer.Option("--interval-s", min=0.0, max=3600.0, help="Interval between images.")
+        float, option("Interval between images.", "--interval-s", min=0.0, max=3600.0)
     ] = 1.0,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -67,17 +67,15 @@ def grab(
 
 @app.command()
 def calibrate(
-    camera: Annotated[
-        str, typer.Argument(help="A folder of images, or a camera.", metavar="FOLDER|CAMERA")
-    ],
-    target: Annotated[Path, typer.Option("--out", help="File for the intrinsics.")],
-    columns: Annotated[int, typer.Option(min=3, max=40, help="Columns of squares.")] = 9,
-    rows: Annotated[int, typer.Option(min=3, max=40, help="Rows of squares.")] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Side of a square.")] = 28.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Side of a marker.")] = 20.0,
-    dictionary: Annotated[str, typer.Option(help="Set of the board's markers.")] = "5X5_100",
+    camera: Annotated[str, argument("A folder of images, or a camera.", metavar="FOLDER|CAMERA")],
+    target: Annotated[Path, option("File for the intrinsics.", "--out")],
+    columns: Annotated[int, option("Columns of squares.", min=3, max=40)] = 9,
+    rows: Annotated[int, option("Rows of squares.", min=3, max=40)] = 6,
+    square_mm: Annotated[float, option("Side of a square.", min=2.0, max=1000.0)] = 28.0,
+    marker_mm: Annotated[float, option("Side of a marker.", min=1.0, max=1000.0)] = 20.0,
+    dictionary: Annotated[str, option("Set of the board's markers.")] = "5X5_100",
     count: Annotated[
-        int, typer.Option(min=5, max=500, help="Images to take with a camera, one per second.")
+        int, option("Images to take with a camera, one per second.", min=5, max=500)
     ] = 30,
     png: PngOption = None,
     overwrite: OverwriteOption = False,

@@ -30,15 +30,9 @@ from cdpr_rt.procedures.commissioning_results import (
     validation_name,
 )
 from cdpr_rt.robot import Robot
+from cdpr_tools.commands import options
 from cdpr_tools.commands.commission import IndexOption
-from cdpr_tools.commands.options import (
-    JsonOption,
-    OverwriteOption,
-    RecordedWinchOption,
-    RobotOption,
-    SocketOption,
-    YesOption,
-)
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
 from cdpr_tools.commission import axis_sweep, build, comparison, summary
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
@@ -56,11 +50,9 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-_OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
-_TurnsOption = Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")]
-_SpeedOption = Annotated[
-    float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
-]
+_OutOption = Annotated[Path, option("Folder for the recordings.", "--out")]
+_TurnsOption = Annotated[int, option("Turns in each direction.", min=1, max=20)]
+_SpeedOption = Annotated[float, option("Speed of the sweep.", "--speed-deg-s", min=0.5, max=60.0)]
 
 
 @app.command()
@@ -71,9 +63,9 @@ def sweep(
     out_dir: _OutOption,
     turns: _TurnsOption = 2,
     speed_deg_s: _SpeedOption = 3.0,
-    overwrite: OverwriteOption = False,
+    overwrite: options.OverwriteOption = False,
     index: IndexOption = "homing",
-    yes: YesOption = False,
+    yes: options.YesOption = False,
 ) -> None:
     """Record the slow sweeps and the fast legs from which `fit` identifies the motor."""
     paths = prepare(out_dir, overwrite)
@@ -94,15 +86,15 @@ def sweep(
 
 @app.command()
 def sweep_axis(
-    axis: Annotated[str, typer.Argument(help="Axis of the running robot.")],
+    axis: Annotated[str, argument("Axis of the running robot.")],
     out_dir: _OutOption,
     turns: _TurnsOption = 2,
     speed_deg_s: _SpeedOption = 3.0,
-    overwrite: OverwriteOption = False,
-    robot: RobotOption = None,
-    socket: SocketOption = None,
-    yes: YesOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.OverwriteOption = False,
+    robot: options.RobotOption = None,
+    socket: options.SocketOption = None,
+    yes: options.YesOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Turn a motor as `sweep` does, for `fit`, through this machine's running daemon.
 
@@ -138,9 +130,9 @@ def sweep_axis(
 
 @app.command()
 def fit(
-    folder: Annotated[Path, typer.Argument(help="The --out folder of sweep or commission.")],
-    winch: RecordedWinchOption = None,
-    as_json: JsonOption = False,
+    folder: Annotated[Path, argument("The --out folder of sweep or commission.")],
+    winch: options.RecordedWinchOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Identify from recorded data and write the cogging profile into the folder."""
     out = Output(as_json)
@@ -157,11 +149,9 @@ def fit(
 
 @app.command(name="compare")
 def compare_runs(
-    folder: Annotated[Path, typer.Argument(help="Folder in which `fit` wrote a profile.")],
-    others: Annotated[
-        list[Path], typer.Argument(help="Folders with other recordings.", metavar="OTHER...")
-    ],
-    as_json: JsonOption = False,
+    folder: Annotated[Path, argument("Folder in which `fit` wrote a profile.")],
+    others: Annotated[list[Path], argument("Folders with other recordings.", metavar="OTHER...")],
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compare how well each method explains the torque of other recordings of the motor.
 
@@ -205,17 +195,14 @@ def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:
 def validate(
     winch: WinchOnBus,
     out: Output,
-    cogging_profile: Annotated[Path, typer.Argument(help="Cogging profile of this motor.")],
+    cogging_profile: Annotated[Path, argument("Cogging profile of this motor.")],
     out_dir: _OutOption,
     bandwidth_Hz: Annotated[
-        float,
-        typer.Option(
-            "--bandwidth-hz", min=1.0, max=100.0, help="Closed-loop bandwidth of the PID."
-        ),
+        float, option("Closed-loop bandwidth of the PID.", "--bandwidth-hz", min=1.0, max=100.0)
     ] = DEFAULT_BANDWIDTH_HZ,
-    overwrite: OverwriteOption = False,
+    overwrite: options.OverwriteOption = False,
     index: IndexOption = "homing",
-    yes: YesOption = False,
+    yes: options.YesOption = False,
 ) -> None:
     """Follow ramps without and with the profile's compensation, under one PID."""
     bounds = MotorBounds(winch.profile.motor)
@@ -244,8 +231,8 @@ def validate(
 
 @app.command()
 def report(
-    folder: Annotated[Path, typer.Argument(help="The --out folder of a commissioning.")],
-    as_json: JsonOption = False,
+    folder: Annotated[Path, argument("The --out folder of a commissioning.")],
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make the report again from the files of a commissioning."""
     out = Output(as_json)

@@ -18,14 +18,8 @@ from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_rt.procedures.measurement import Index
-from cdpr_tools.commands.options import (
-    JsonOption,
-    OverwriteOption,
-    PlantOption,
-    RobotOrWinchArgument,
-    SafetyIoOption,
-    YesOption,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import option
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH
 from cdpr_tools.commission.run import Request, commission_winch, prepare
 from cdpr_tools.composition.session import confirm_motion, open_bus
@@ -35,9 +29,8 @@ from cdpr_tools.output import Output
 
 IndexOption = Annotated[
     Index,
-    typer.Option(
-        "--index",
-        help="Find the encoder index by homing, or by touch probe during a normal motion.",
+    option(
+        "Find the encoder index by homing, or by touch probe during a normal motion.", "--index"
     ),
 ]
 
@@ -117,46 +110,40 @@ def _lines_for_robot(robot: Robot, motors: Sequence[_MotorOfRobot]) -> list[str]
 
 @app.command()
 def commission(
-    machine: RobotOrWinchArgument,
+    machine: options.RobotOrWinchArgument,
     bus: Annotated[
         list[str] | None,
-        typer.Option(
-            "--bus",
-            help="simbus: (starts simulated drives), simbus:NAME, socketcan:can0, ...; "
+        option(
+            "simbus: (starts simulated drives), simbus:NAME, socketcan:can0, ...; "
             "for a robot also BUS=URL; default: the URLs in its file.",
+            "--bus",
             metavar="URL",
         ),
     ] = None,
     axis: Annotated[
-        list[str] | None,
-        typer.Option(help="For a robot: the axis whose motor is measured; may be repeated."),
+        list[str] | None, option("For a robot: the axis whose motor is measured; may be repeated.")
     ] = None,
     every: Annotated[
-        bool, typer.Option("--all", help="For a robot: measure all motors, one after the other.")
+        bool, option("For a robot: measure all motors, one after the other.", "--all")
     ] = False,
-    plant: PlantOption = None,
+    plant: options.PlantOption = None,
     out_dir: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for raw data, profile and report, with a subfolder for each axis of a "
+        option(
+            "Folder for raw data, profile and report, with a subfolder for each axis of a "
             "robot; default out/commission-NAME.",
+            "--out",
         ),
     ] = None,
     bandwidth_Hz: Annotated[
-        float,
-        typer.Option(
-            "--bandwidth-hz", min=1.0, max=100.0, help="Closed-loop bandwidth of the PID."
-        ),
+        float, option("Closed-loop bandwidth of the PID.", "--bandwidth-hz", min=1.0, max=100.0)
     ] = DEFAULT_BANDWIDTH_HZ,
-    overwrite: OverwriteOption = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A rough result in a fifth of the time.")
-    ] = False,
+    overwrite: options.OverwriteOption = False,
+    quick: Annotated[bool, option("A rough result in a fifth of the time.", "--quick")] = False,
     index: IndexOption = "homing",
-    safety_io: SafetyIoOption = None,
-    yes: YesOption = False,
-    as_json: JsonOption = False,
+    safety_io: options.SafetyIoOption = None,
+    yes: options.YesOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure, identify, validate and report motors, each detached from its load."""
     out = Output(as_json)

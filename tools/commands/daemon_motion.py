@@ -14,6 +14,7 @@ from cdpr_rt.robot import Robot
 from cdpr_tools.client.client import Daemon, axis_values, key_values
 from cdpr_tools.client.motion import Outcome, carry_out, finish, require_platform, run_to_end
 from cdpr_tools.client.refusals import in_typed_words
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.number_options import (
@@ -144,18 +145,17 @@ def jog(
     out: Output,
     axes: Annotated[
         list[str],
-        typer.Argument(
-            help="Speeds in deg/s at the motor; or one step of a platform along x, y, z in mm, "
+        argument(
+            "Speeds in deg/s at the motor; or one step of a platform along x, y, z in mm, "
             "about angle, rx, ry, rz in deg, such as x=10.",
             metavar="AXIS=SPEED... | DIRECTION=STEP...",
         ),
     ],
     seconds: Annotated[
-        float | None,
-        typer.Option(min=0.1, max=3600.0, help="Duration of a speed; 1 if left out."),
+        float | None, option("Duration of a speed; 1 if left out.", min=0.1, max=3600.0)
     ] = None,
     cable: Annotated[
-        bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
+        bool, option("Speeds are mm/s of cable, positive pays out.", "--cable")
     ] = False,
 ) -> None:
     """Turn axes at a constant speed for a while, or move a platform by one step."""
@@ -185,40 +185,37 @@ def move(
     daemon: Daemon,
     out: Output,
     axes: Annotated[
-        list[str] | None,
-        typer.Argument(help="Angles in deg of the motor.", metavar="[AXIS=ANGLE]..."),
+        list[str] | None, argument("Angles in deg of the motor.", metavar="[AXIS=ANGLE]...")
     ] = None,
     to: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "The platform to this position, in mm, or to a pose that the robot's file names.",
             metavar="X Y [Z] | NAME",
-            help="The platform to this position, in mm, or to a pose that the robot's file names.",
         ),
     ] = None,
     rotate: Annotated[
         str | None,
-        typer.Option(
-            metavar="RX RY RZ | ANGLE",
-            help="Turn the platform to this rotation vector from its orientation at home, in "
+        option(
+            "Turn the platform to this rotation vector from its orientation at home, in "
             "deg; in a plane one angle.",
+            metavar="RX RY RZ | ANGLE",
         ),
     ] = None,
-    relative: Annotated[
-        bool, typer.Option("--relative", help="Relative to the present position.")
-    ] = False,
+    relative: Annotated[bool, option("Relative to the present position.", "--relative")] = False,
     frame: Annotated[
         ReferenceFrame,
-        typer.Option(help="With --relative: the axes along and about which the platform moves."),
+        option("With --relative: the axes along and about which the platform moves."),
     ] = ReferenceFrame.ROOM,
     cable: Annotated[
-        bool, typer.Option("--cable", help="Relative, in mm of cable; positive pays out.")
+        bool, option("Relative, in mm of cable; positive pays out.", "--cable")
     ] = False,
     speed: Annotated[
         float | None,
-        typer.Option(
-            min=0.01,
-            help="Top speed: deg/s at the motor, or mm/s of a platform, whose rotation slows "
+        option(
+            "Top speed: deg/s at the motor, or mm/s of a platform, whose rotation slows "
             "down in proportion.",
+            min=0.01,
         ),
     ] = None,
 ) -> None:
@@ -303,16 +300,13 @@ def _goals(daemon: Daemon, axes: list[str], cable: bool, relative: bool) -> list
 def controller(
     daemon: Daemon,
     out: Output,
-    name: Annotated[str, typer.Argument(help="Program: hold, idle, sweep, pid, ...")],
+    name: Annotated[str, argument("Program: hold, idle, sweep, pid, ...")],
     values: Annotated[
-        list[str] | None,
-        typer.Argument(help="Arguments of the program, in JSON.", metavar="[KEY=VALUE]..."),
+        list[str] | None, argument("Arguments of the program, in JSON.", metavar="[KEY=VALUE]...")
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option(
-            min=0.1, help="End after this many seconds; by default when the program is done."
-        ),
+        option("End after this many seconds; by default when the program is done.", min=0.1),
     ] = None,
 ) -> None:
     """Run a program (a controller with its motion) until it is done, then hold.
@@ -354,11 +348,11 @@ def tighten(
     out: Output,
     source: Annotated[
         LengthSource | None,
-        typer.Option(
-            "--from",
-            help="Source of the cable lengths: the platform stands at home, the lengths of the "
+        option(
+            "Source of the cable lengths: the platform stands at home, the lengths of the "
             "last stop, or the lengths that the daemon knows. Default: what it knows, else "
             "home.",
+            "--from",
         ),
     ] = None,
 ) -> None:
@@ -376,8 +370,7 @@ def lower(
     daemon: Daemon,
     out: Output,
     blind: Annotated[
-        bool,
-        typer.Option("--blind", help="Every winch pays out its cable, wherever that leads."),
+        bool, option("Every winch pays out its cable, wherever that leads.", "--blind")
     ] = False,
 ) -> None:
     """Lower the platform onto its stand and slacken the cables; the power stays on."""

@@ -22,15 +22,9 @@ from cdpr_tools.client.status_text import (
     next_steps,
     status_text,
 )
+from cdpr_tools.commands import options
 from cdpr_tools.commands.browser import open_page
-from cdpr_tools.commands.options import (
-    JsonOption,
-    KeyFileOption,
-    RobotOption,
-    SocketOption,
-    UrlOption,
-    YesOption,
-)
+from cdpr_tools.commands.options import option
 from cdpr_tools.commands.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.estop import end_leftover_processes
@@ -53,9 +47,7 @@ app = typer.Typer()
 def status(
     daemon: Daemon,
     out: Output,
-    watch: Annotated[
-        bool, typer.Option("--watch", help="Show it continuously until Ctrl-C.")
-    ] = False,
+    watch: Annotated[bool, option("Show it continuously until Ctrl-C.", "--watch")] = False,
 ) -> None:
     """Show the state of the daemon and its robot."""
     state = daemon.get("/status")
@@ -71,7 +63,7 @@ def status(
 def page(
     daemon: Daemon,
     out: Output,
-    open_it: Annotated[bool, typer.Option("--open", help="Open it in a browser.")] = False,
+    open_it: Annotated[bool, option("Open it in a browser.", "--open")] = False,
 ) -> None:
     """Print the address of the robot's page for a browser, or open it.
 
@@ -115,10 +107,8 @@ def check(daemon: Daemon, out: Output) -> None:
 def enable(
     daemon: Daemon,
     out: Output,
-    program: Annotated[
-        str, typer.Option(help="Program that runs as soon as there is power.")
-    ] = "hold",
-    yes: YesOption = False,
+    program: Annotated[str, option("Program that runs as soon as there is power.")] = "hold",
+    yes: options.YesOption = False,
 ) -> None:
     """Switch the drives on; they hold their position.
 
@@ -212,11 +202,11 @@ def ack(daemon: Daemon, out: Output) -> None:
 
 @app.command()
 def stop(
-    robot: RobotOption = None,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
-    as_json: JsonOption = False,
+    robot: options.RobotOption = None,
+    socket: options.SocketOption = None,
+    url: options.UrlOption = None,
+    key_file: options.KeyFileOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Stop the motion under control, switch the drives off and end the daemon.
 

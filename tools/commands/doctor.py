@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles.user_folders import temporary_folder
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, option
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.host.host_checks import HostFinding, look_around
 from cdpr_tools.output import Output
@@ -23,23 +23,18 @@ app = typer.Typer()
 def doctor(
     report: Annotated[
         Path | None,
-        typer.Option(
-            help="Write everything that a fault report needs into this file; it contains no keys.",
-        ),
+        option("Write everything that a fault report needs into this file; it contains no keys."),
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option("--robot", help="With --report: a robot's file to include; may be repeated."),
+        option("With --report: a robot's file to include; may be repeated.", "--robot"),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an existing --report file.")
-    ] = False,
+    overwrite: Annotated[bool, option("Replace an existing --report file.", "--overwrite")] = False,
     compile_all: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Only compile all numeric kernels. This takes minutes, and no command does it later.",
             "--compile",
-            help="Only compile all numeric kernels. This takes minutes, and no command does it "
-            "later.",
         ),
     ] = False,
     as_json: JsonOption = False,

@@ -19,7 +19,7 @@ from cdpr_rt.control.pid import Pid
 from cdpr_rt.loop.operating import Tolerance
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.programs.model import position_loop
-from cdpr_tools.commands.options import SafetyIoOption, YesOption
+from cdpr_tools.commands.options import SafetyIoOption, YesOption, argument, option
 from cdpr_tools.commands.with_winch import WinchOnBus, with_powered_winch, with_winch
 from cdpr_tools.composition.session import Session, confirm_motion, open_winch
 from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
@@ -101,7 +101,7 @@ def _state(network: CanNetwork, profile: Winch) -> State:
 def enable(
     winch: WinchOnBus,
     out: Output,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="For how long.")] = 2.0,
+    seconds: Annotated[float, option("For how long.", min=0.1, max=600.0)] = 2.0,
 ) -> None:
     """Enable the drive in torque mode without torque for a while, then switch it off."""
     with winch.powered("the drive's power stage is switched on") as session:
@@ -130,9 +130,7 @@ def reset(winch: WinchOnBus, out: Output, safety_io: SafetyIoOption = None) -> N
 def home(
     winch: WinchOnBus,
     out: Output,
-    method: Annotated[
-        int, typer.Option(help="Homing method of CiA 402: 33, 34, 37, 35, 1 to 14.")
-    ] = 34,
+    method: Annotated[int, option("Homing method of CiA 402: 33, 34, 37, 35, 1 to 14.")] = 34,
 ) -> None:
     """Find the encoder index by homing; the motor turns by up to a turn."""
     drive = winch.profile.drive
@@ -152,9 +150,9 @@ def jog(
     winch: WinchOnBus,
     out: Output,
     speed_deg_s: Annotated[
-        float, typer.Option("--speed-deg-s", help="Motor speed; its sign is the direction.")
+        float, option("Motor speed; its sign is the direction.", "--speed-deg-s")
     ] = 22.0,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="For how long.")] = 3.0,
+    seconds: Annotated[float, option("For how long.", min=0.1, max=600.0)] = 3.0,
 ) -> None:
     """Turn the motor at a constant speed under the PID, then switch it off."""
     fastest = 0.1 * math.degrees(winch.profile.motor.rated_speed_rad_s)
@@ -192,9 +190,9 @@ def _jog_controller(session: Session) -> Pid:
 def od(
     winch: WinchOnBus,
     out: Output,
-    entry: Annotated[str, typer.Argument(help="Object, hexadecimal, such as 6064 or 1018:1.")],
+    entry: Annotated[str, argument("Object, hexadecimal, such as 6064 or 1018:1.")],
     value: Annotated[
-        str | None, typer.Option("--set", help="Write this integer (0x.. for hexadecimal).")
+        str | None, option("Write this integer (0x.. for hexadecimal).", "--set")
     ] = None,
     yes: YesOption = False,
 ) -> None:
@@ -235,7 +233,7 @@ def configure(
     winch: WinchOnBus,
     out: Output,
     store: Annotated[
-        bool, typer.Option("--store", help="Store the configuration in the drive (1010h).")
+        bool, option("Store the configuration in the drive (1010h).", "--store")
     ] = False,
 ) -> None:
     """Write the configuration of the profile to the drive; nothing is enabled."""

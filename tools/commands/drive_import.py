@@ -19,7 +19,7 @@ from cdpr_profiles import load_drive
 from cdpr_profiles.bounded_input import read_bytes
 from cdpr_profiles.eds import MOST_EDS_BYTES, DataSheet, bits_of, read_eds
 from cdpr_profiles.errors import ProfileError
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, argument, option
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 
@@ -52,10 +52,10 @@ app = typer.Typer()
 
 @app.command("import")
 def import_drive(
-    file: Annotated[Path, typer.Argument(help="EDS or DCF of the drive.", metavar="FILE")],
-    out_dir: Annotated[Path, typer.Option("--out", help="Folder for the profile.")] = Path(),
+    file: Annotated[Path, argument("EDS or DCF of the drive.", metavar="FILE")],
+    out_dir: Annotated[Path, option("Folder for the profile.", "--out")] = Path(),
     name: Annotated[
-        str | None, typer.Option(help="Name of the profile; default the name of the file.")
+        str | None, option("Name of the profile; default the name of the file.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

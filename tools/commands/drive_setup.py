@@ -23,7 +23,7 @@ from cdpr_drivers.canopen.sdo import ABSENT
 from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
 from cdpr_profiles import DriveProfile, list_profiles, load_drive
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, option
 from cdpr_tools.composition.session import open_bus
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
@@ -83,38 +83,30 @@ class _NewSettings:
 
 @app.command()
 def lss(
-    bus: Annotated[
-        str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
-    ],
+    bus: Annotated[str, option("simbus:NAME, socketcan:can0, ...", "--bus", metavar="URL")],
     profile: Annotated[
-        str | None,
-        typer.Option(help="Drive profile: finds devices of this type, with a node id or without."),
+        str | None, option("Drive profile: finds devices of this type, with a node id or without.")
     ] = None,
-    serial: Annotated[int | None, typer.Option(min=0, help="Its serial number.")] = None,
+    serial: Annotated[int | None, option("Its serial number.", min=0)] = None,
     alone: Annotated[
-        bool, typer.Option("--alone", help="It is the only device on the bus: no search.")
+        bool, option("It is the only device on the bus: no search.", "--alone")
     ] = False,
-    node_id: Annotated[int | None, typer.Option(min=1, max=127, help="Node id to give it.")] = None,
+    node_id: Annotated[int | None, option("Node id to give it.", min=1, max=127)] = None,
     bitrate: Annotated[
-        str | None,
-        typer.Option(help="Bit rate to give it, such as 500k; takes effect at the next power-on."),
+        str | None, option("Bit rate to give it, such as 500k; takes effect at the next power-on.")
     ] = None,
     activate: Annotated[
         bool,
-        typer.Option(
-            "--activate", help="Change the bit rate immediately; you must change that of the bus."
-        ),
+        option("Change the bit rate immediately; you must change that of the bus.", "--activate"),
     ] = False,
     switch_delay_ms: Annotated[
-        int, typer.Option(min=1, max=30_000, help="Silence before and after --activate.")
+        int, option("Silence before and after --activate.", min=1, max=30_000)
     ] = 1000,
-    store: Annotated[bool, typer.Option("--store/--no-store", help="Store it in the device.")] = (
-        True
-    ),
+    store: Annotated[bool, option("Store it in the device.", "--store/--no-store")] = (True),
     timeout_ms: Annotated[
-        int, typer.Option("--timeout-ms", min=1, max=10_000, help="Longest time for an answer.")
+        int, option("Longest time for an answer.", "--timeout-ms", min=1, max=10_000)
     ] = 100,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    yes: Annotated[bool, option("Do not ask before writing.", "--yes")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Find drives by LSS (CiA 305) and set a node id and bit rate."""

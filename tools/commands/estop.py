@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.command_group import ROBOT_VARIABLE
-from cdpr_tools.commands.options import JsonOption, SocketOption
+from cdpr_tools.commands.options import JsonOption, SocketOption, argument, option
 from cdpr_tools.daemon.estop import EmergencyStop
 from cdpr_tools.daemon.loop_file import LoopFile, find_loops
 from cdpr_tools.daemon.paths import found_instead, short_name
@@ -24,13 +24,10 @@ app = typer.Typer()
 @app.command()
 def estop(
     robot: Annotated[
-        str | None,
-        typer.Argument(metavar="[ROBOT]", help="Which robot, if several daemons run."),
+        str | None, argument("Which robot, if several daemons run.", metavar="[ROBOT]")
     ] = None,
-    named: Annotated[str | None, typer.Option("--robot", help="The same as ROBOT.")] = None,
-    every: Annotated[
-        bool, typer.Option("--all", help="Every robot whose daemon is found.")
-    ] = False,
+    named: Annotated[str | None, option("The same as ROBOT.", "--robot")] = None,
+    every: Annotated[bool, option("Every robot whose daemon is found.", "--all")] = False,
     socket: SocketOption = None,
     as_json: JsonOption = False,
 ) -> None:

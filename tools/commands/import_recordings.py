@@ -9,13 +9,8 @@ import typer
 
 from cdpr_profiles import Winch, load_robot, load_winch, load_winch_or_robot
 from cdpr_profiles.robot import robot_of_winch
-from cdpr_tools.commands.options import (
-    JsonOption,
-    OverwriteOption,
-    RobotArgument,
-    RobotOrWinchArgument,
-    WinchArgument,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commission.run import prepare
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
@@ -33,27 +28,21 @@ def _group() -> None:
     """Convert recordings of other programs: CSV, OptiTrack, Vicon, candump, MCAP."""
 
 
-FilesArgument = Annotated[
-    list[Path],
-    typer.Argument(help="CSV, candump or MCAP files.", metavar="FILE..."),
-]
-MapOption = Annotated[
-    Path, typer.Option("--map", help="Which column is what, TOML.", metavar="FILE")
-]
+FilesArgument = Annotated[list[Path], argument("CSV, candump or MCAP files.", metavar="FILE...")]
+MapOption = Annotated[Path, option("Which column is what, TOML.", "--map", metavar="FILE")]
 PosesOption = Annotated[
-    Path | None,
-    typer.Option("--poses", help="File with the poses, if it is another one.", metavar="FILE"),
+    Path | None, option("File with the poses, if it is another one.", "--poses", metavar="FILE")
 ]
 
 
 @app.command()
 def motor(
-    winch: WinchArgument,
+    winch: options.WinchArgument,
     files: FilesArgument,
     mapping: MapOption,
-    out_dir: Annotated[Path, typer.Option("--out", help="Folder for the passes.", metavar="DIR")],
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    out_dir: Annotated[Path, option("Folder for the passes.", "--out", metavar="DIR")],
+    overwrite: options.OverwriteOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Convert recordings of a turning motor for `cdpr cogging fit` and `cdpr cogging compare`.
 
@@ -88,13 +77,13 @@ def motor(
 
 @app.command()
 def calibration(
-    robot: RobotArgument,
-    cables: Annotated[Path, typer.Argument(help="File with the cable lengths.", metavar="FILE")],
+    robot: options.RobotArgument,
+    cables: Annotated[Path, argument("File with the cable lengths.", metavar="FILE")],
     mapping: MapOption,
-    out_dir: Annotated[Path, typer.Option("--out", help="Folder for data.json.", metavar="DIR")],
+    out_dir: Annotated[Path, option("Folder for data.json.", "--out", metavar="DIR")],
     poses: PosesOption = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.OverwriteOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Convert cable lengths and measured poses for `cdpr calibrate fit ROBOT --data DIR`.
 
@@ -120,15 +109,13 @@ def calibration(
 
 @app.command()
 def log(
-    machine: RobotOrWinchArgument,
-    file: Annotated[Path, typer.Argument(help="CSV, candump or MCAP file.", metavar="FILE")],
+    machine: options.RobotOrWinchArgument,
+    file: Annotated[Path, argument("CSV, candump or MCAP file.", metavar="FILE")],
     mapping: MapOption,
-    target: Annotated[
-        Path, typer.Option("--out", help="Recording to write; a name ending in .mcap.")
-    ],
+    target: Annotated[Path, option("Recording to write; a name ending in .mcap.", "--out")],
     poses: PosesOption = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.OverwriteOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Convert a recording for `cdpr log info`, `cdpr log plot` and `cdpr log export`.
 

@@ -15,7 +15,7 @@ from cdpr_drivers.modbus.safety_io import IoLink, IoState
 from cdpr_drivers.robot.safety import connect, kept_trip
 from cdpr_profiles.safety_io import Brake, Contactor, load_safety_io
 from cdpr_rt.core.clock import PacedClock
-from cdpr_tools.commands.options import JsonOption, YesOption
+from cdpr_tools.commands.options import JsonOption, YesOption, argument, option
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
@@ -23,12 +23,8 @@ from cdpr_tools.signals import stop_on_signals
 
 app = typer.Typer(name="io", help="Show and test the safety I/O.", no_args_is_help=True)
 
-_IoArgument = Annotated[
-    str, typer.Argument(help="Profile: a name, a file, NAME@HOST:PORT.", metavar="IO")
-]
-_Seconds = Annotated[
-    float, typer.Option(min=0.1, max=86400.0, help="Duration; Ctrl-C ends it early.")
-]
+_IoArgument = Annotated[str, argument("Profile: a name, a file, NAME@HOST:PORT.", metavar="IO")]
+_Seconds = Annotated[float, option("Duration; Ctrl-C ends it early.", min=0.1, max=86400.0)]
 
 
 @app.command()
@@ -71,7 +67,7 @@ def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = Fal
 @app.command()
 def light(
     io: _IoArgument,
-    colour: Annotated[str, typer.Argument(help="red, yellow, green, blue or white.")],
+    colour: Annotated[str, argument("red, yellow, green, blue or white.")],
     seconds: _Seconds = 3.0,
     as_json: JsonOption = False,
 ) -> None:
@@ -98,7 +94,7 @@ def light(
 @app.command()
 def brake(
     io: _IoArgument,
-    axis: Annotated[str, typer.Argument(help="Axis, as the profile calls it.")],
+    axis: Annotated[str, argument("Axis, as the profile calls it.")],
     seconds: _Seconds = 5.0,
     yes: YesOption = False,
     as_json: JsonOption = False,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_rt.service.retention import size_text
-from cdpr_tools.commands.options import JsonOption, written_as
+from cdpr_tools.commands.options import JsonOption, argument, option, written_as
 from cdpr_tools.daemon.paths import default_recordings
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
@@ -31,19 +31,19 @@ app = typer.Typer(
 
 _FilesArgument = Annotated[
     list[Path],
-    typer.Argument(
-        help="Recordings (*.mcap), a folder of them, or a session that `cdpr log list` names.",
+    argument(
+        "Recordings (*.mcap), a folder of them, or a session that `cdpr log list` names.",
         metavar="FILE",
     ),
 ]
 _FromOption = Annotated[
-    float, typer.Option("--from", help="Begin this many seconds after the first cycle.", min=0.0)
+    float, option("Begin this many seconds after the first cycle.", "--from", min=0.0)
 ]
 _UntilOption = Annotated[
     float,
-    typer.Option(
+    option(
+        "End this many seconds after the first cycle; default: the last cycle.",
         "--until",
-        help="End this many seconds after the first cycle; default: the last cycle.",
         show_default=False,
     ),
 ]
@@ -54,9 +54,7 @@ _EVENTS_SHOWN = 30
 def list_command(
     folder: Annotated[
         Path | None,
-        typer.Argument(
-            help="Folder of recordings; default: that of `cdpr run`.", metavar="[FOLDER]"
-        ),
+        argument("Folder of recordings; default: that of `cdpr run`.", metavar="[FOLDER]"),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -93,15 +91,13 @@ def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
 @app.command("export")
 def export_command(
     files: _FilesArgument,
-    target: Annotated[Path, typer.Option("--out", help="A name ending in .csv or .parquet.")],
+    target: Annotated[Path, option("A name ending in .csv or .parquet.", "--out")],
     fields: Annotated[
-        str | None, typer.Option(help="Only these fields, separated by commas; default: all.")
+        str | None, option("Only these fields, separated by commas; default: all.")
     ] = None,
     from_s: _FromOption = 0.0,
     until_s: _UntilOption = float("inf"),
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an existing file.")
-    ] = False,
+    overwrite: Annotated[bool, option("Replace an existing file.", "--overwrite")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write the cycles of recordings, one after the other, into one table."""
@@ -119,18 +115,16 @@ def plot(
     files: _FilesArgument,
     target: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Draw it into NAME.png; beside the recording by default.",
             "--png",
             "--out",
             metavar="FILE",
-            help="Draw it into NAME.png; beside the recording by default.",
             callback=written_as(".png"),
         ),
     ] = None,
-    axis: Annotated[list[str] | None, typer.Option(help="Only this axis; may be repeated.")] = None,
-    every: Annotated[
-        bool, typer.Option("--all", help="Draw all sessions, not the newest.")
-    ] = False,
+    axis: Annotated[list[str] | None, option("Only this axis; may be repeated.")] = None,
+    every: Annotated[bool, option("Draw all sessions, not the newest.", "--all")] = False,
     from_s: _FromOption = 0.0,
     until_s: _UntilOption = float("inf"),
     as_json: JsonOption = False,

@@ -29,7 +29,8 @@ from cdpr_rt.calibration.markers.geometry import logarithms
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
 from cdpr_rt.calibration.markers.marker_map import Coverage, Sighting
 from cdpr_rt.core.clock import PacedClock
-from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption, written_as
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import require_free, save
@@ -250,32 +251,29 @@ app = typer.Typer(
 
 _SizeOption = Annotated[
     float | None,
-    typer.Option("--size-mm", min=1.0, max=10000.0, help="Width of the black square, outer edges."),
+    option("Width of the black square, outer edges.", "--size-mm", min=1.0, max=10000.0),
 ]
-_DictionaryOption = Annotated[
-    str, typer.Option(help="Dictionary of markers, by its name in OpenCV.")
-]
+_DictionaryOption = Annotated[str, option("Dictionary of markers, by its name in OpenCV.")]
 _SheetsOption = Annotated[
-    Path | None,
-    typer.Option("--markers", help="File with sizes and known places of markers."),
+    Path | None, option("File with sizes and known places of markers.", "--markers")
 ]
-_PageOption = Annotated[str, typer.Option(help=f"Paper: {', '.join(PAGES_mm)}.")]
+_PageOption = Annotated[str, option(f"Paper: {', '.join(PAGES_mm)}.")]
 _PdfOption = Annotated[
-    Path, typer.Option("--out", help="PDF file.", callback=written_as(".pdf", mark=b""))
+    Path, option("PDF file.", "--out", callback=options.written_as(".pdf", mark=b""))
 ]
 _MIRROR_CHECKS = 12
 
 
 @app.command("print")
 def print_command(
-    ids: Annotated[str, typer.Argument(help="Marker ids, such as 0-39 or 0,3,7.", metavar="IDS")],
+    ids: Annotated[str, argument("Marker ids, such as 0-39 or 0,3,7.", metavar="IDS")],
     size_mm: _SizeOption = None,
     dictionary: _DictionaryOption = "4X4_100",
     sheets: _SheetsOption = None,
     page: _PageOption = "A4",
     target: _PdfOption = Path("markers.pdf"),
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.OverwriteOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write a PDF with a marker of true size on each page, and a bar to check the printer."""
     out = Output(as_json)
@@ -295,14 +293,14 @@ def print_command(
 @app.command()
 def board(
     page: _PageOption = "A4",
-    columns: Annotated[int, typer.Option(min=3, max=40, help="Columns of squares.")] = 9,
-    rows: Annotated[int, typer.Option(min=3, max=40, help="Rows of squares.")] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Side of a square.")] = 28.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Side of a marker.")] = 20.0,
+    columns: Annotated[int, option("Columns of squares.", min=3, max=40)] = 9,
+    rows: Annotated[int, option("Rows of squares.", min=3, max=40)] = 6,
+    square_mm: Annotated[float, option("Side of a square.", min=2.0, max=1000.0)] = 28.0,
+    marker_mm: Annotated[float, option("Side of a marker.", min=1.0, max=1000.0)] = 20.0,
     dictionary: _DictionaryOption = "5X5_100",
     target: _PdfOption = Path("board.pdf"),
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.OverwriteOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write a PDF with a ChArUco board, for finding a camera's intrinsics."""
     out = Output(as_json)
@@ -319,25 +317,22 @@ def board(
 
 @app.command("map")
 def map_command(
-    folder: Annotated[Path, typer.Argument(help="Images, in the order of their names.")],
+    folder: Annotated[Path, argument("Images, in the order of their names.")],
     camera: Annotated[
-        Path | None,
-        typer.Option(help="Intrinsics of the camera; default: camera.toml in FOLDER."),
+        Path | None, option("Intrinsics of the camera; default: camera.toml in FOLDER.")
     ] = None,
     size_mm: _SizeOption = None,
     dictionary: _DictionaryOption = "4X4_100",
     sheets: _SheetsOption = None,
     reference: Annotated[
         int | None,
-        typer.Option(
-            help="Marker whose frame is that of the map; chosen automatically by default."
-        ),
+        option("Marker whose frame is that of the map; chosen automatically by default."),
     ] = None,
     target: Annotated[
-        Path | None, typer.Option("--out", help="Write the map here, as a file for --markers.")
+        Path | None, option("Write the map here, as a file for --markers.", "--out")
     ] = None,
-    png: PngOption = None,
-    as_json: JsonOption = False,
+    png: options.PngOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make a map of markers from images of them, and report its accuracy and any problems."""
     out = Output(as_json)

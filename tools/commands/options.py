@@ -18,6 +18,16 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.save import OWN_MARK
 
 
+def option(text: str, /, *names: str, **more: Any) -> Any:
+    """Return the declaration of an option with this help; `names` if not the parameter's own."""
+    return typer.Option(*names, help=text, **more)
+
+
+def argument(text: str, /, **more: Any) -> Any:
+    """Return the declaration of an argument with this help."""
+    return typer.Argument(help=text, **more)
+
+
 def shares(
     options: Callable[..., AbstractContextManager[tuple[Any, ...]]],
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -78,103 +88,92 @@ def written_as(
 
 PngOption = Annotated[
     Path | None,
-    typer.Option(
-        "--png", metavar="FILE", help="Draw it into NAME.png.", callback=written_as(".png")
-    ),
+    option("Draw it into NAME.png.", "--png", metavar="FILE", callback=written_as(".png")),
 ]
 
 RobotArgument = Annotated[
     str,
-    typer.Argument(
-        help="Robot profile: a name or the path of a file.",
-        metavar="ROBOT",
-        envvar=ROBOT_VARIABLE,
+    argument(
+        "Robot profile: a name or the path of a file.", metavar="ROBOT", envvar=ROBOT_VARIABLE
     ),
 ]
 RobotPlantOption = Annotated[
-    Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
+    Path | None, option("Plant file: the truth about robot, cables and motors.")
 ]
-SeedOption = Annotated[int, typer.Option(min=0, help="Random seed.")]
+SeedOption = Annotated[int, option("Random seed.", min=0)]
 CommissionedOption = Annotated[
-    Path | None,
-    typer.Option(help="Folder with the results of `cdpr commission ROBOT`.", metavar="DIR"),
+    Path | None, option("Folder with the results of `cdpr commission ROBOT`.", metavar="DIR")
 ]
 AgainOption = Annotated[
-    bool, typer.Option("--again", help="Evaluate the data in --out again, without motion.")
+    bool, option("Evaluate the data in --out again, without motion.", "--again")
 ]
 WinchArgument = Annotated[
-    str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
+    str, argument("Winch profile: a name or the path of a file.", metavar="WINCH")
 ]
 BusOption = Annotated[
     str,
-    typer.Option(
+    option(
+        "simbus: (starts a simulated drive), simbus:NAME, socketcan:can0, ...",
         "--bus",
-        help="simbus: (starts a simulated drive), simbus:NAME, socketcan:can0, ...",
         metavar="URL",
     ),
 ]
 PlantOption = Annotated[
-    Path | None,
-    typer.Option("--plant", help="Plant file for the simulated drive that `simbus:` starts."),
+    Path | None, option("Plant file for the simulated drive that `simbus:` starts.", "--plant")
 ]
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="End with one JSON line on standard output.")
-]
+JsonOption = Annotated[bool, option("End with one JSON line on standard output.", "--json")]
 ControllerOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "Your own controller of the platform, or MODULE:CLASS. This runs the code there.",
         "--controller",
         "--control",
         metavar="FILE.py:CLASS",
-        help="Your own controller of the platform, or MODULE:CLASS. This runs the code there.",
     ),
 ]
 TensionDistributionOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "Your own tension distribution, or MODULE:NAME. This runs the code there.",
         "--tension-distribution",
         metavar="FILE.py:NAME",
-        help="Your own tension distribution, or MODULE:NAME. This runs the code there.",
     ),
 ]
 ProgramOption = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "A program of your own, or MODULE:CLASS; repeatable. This runs the code there.",
         "--program",
         metavar="FILE.py:CLASS",
-        help="A program of your own, or MODULE:CLASS; repeatable. This runs the code there.",
     ),
 ]
 AllowCodeOption = Annotated[
     bool,
-    typer.Option(
-        "--allow-code",
-        help="Trust the code that the robot's file names, and run it until it changes.",
+    option(
+        "Trust the code that the robot's file names, and run it until it changes.", "--allow-code"
     ),
 ]
-YesOption = Annotated[
-    bool, typer.Option("--yes", help="Do not ask before a real motor is energised.")
-]
+YesOption = Annotated[bool, option("Do not ask before a real motor is energised.", "--yes")]
 
 SafetyIoOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "Safety I/O that must permit power: a name, a file, NAME@HOST:PORT.",
         "--safety-io",
-        help="Safety I/O that must permit power: a name, a file, NAME@HOST:PORT.",
         metavar="IO",
     ),
 ]
 
 SensorsOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "Tension sensors, a name or a file: too high or unknown tension stops the motion.",
         "--sensors",
-        help="Tension sensors, a name or a file: too high or unknown tension stops the motion.",
         metavar="SENSORS",
     ),
 ]
 SensorsPortOption = Annotated[
-    str | None, typer.Option("--tension-port", help="Serial port of the tension sensors' line.")
+    str | None, option("Serial port of the tension sensors' line.", "--tension-port")
 ]
 
 
@@ -188,57 +187,51 @@ def _or_usual(context: typer.Context, robot: str | None) -> str | None:
 
 RobotOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        f"Which robot's daemon, if several run; {ROBOT_VARIABLE} is its default.",
         "--robot",
-        help=f"Which robot's daemon, if several run; {ROBOT_VARIABLE} is its default.",
         callback=_or_usual,
     ),
 ]
 SocketOption = Annotated[
-    Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not the default.")
+    Path | None, option("The daemon's Unix socket, if not the default.", "--socket")
 ]
 UrlOption = Annotated[
-    str | None,
-    typer.Option("--url", metavar="http://HOST:PORT", help="URL of a daemon on another machine."),
+    str | None, option("URL of a daemon on another machine.", "--url", metavar="http://HOST:PORT")
 ]
-KeyFileOption = Annotated[
-    Path | None, typer.Option("--key-file", help="File with the key for --url.")
-]
+KeyFileOption = Annotated[Path | None, option("File with the key for --url.", "--key-file")]
 ClusterOption = Annotated[
-    str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="Compute on this Ray cluster."),
+    str | None, option("Compute on this Ray cluster.", "--cluster", metavar="ADDRESS")
 ]
 HandEyeOption = Annotated[
     Path | None,
-    typer.Option(
-        "--hand-eye",
-        help="Measured place of the camera on the platform; by default found from the "
+    option(
+        "Measured place of the camera on the platform; by default found from the "
         "robot's rotations.",
+        "--hand-eye",
         metavar="FILE",
     ),
 ]
-OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Replace files that are already in --out.")
-]
+OverwriteOption = Annotated[bool, option("Replace files that are already in --out.", "--overwrite")]
 ExitWithStdinOption = Annotated[
-    bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
+    bool, option("Stop when standard input, a pipe, ends.", "--exit-with-stdin")
 ]
 RobotOrWinchArgument = Annotated[
     str,
-    typer.Argument(
-        help="Robot or winch profile: a name or the path of a file.",
+    argument(
+        "Robot or winch profile: a name or the path of a file.",
         metavar="ROBOT|WINCH",
         envvar=ROBOT_VARIABLE,
     ),
 ]
 RecordedWinchOption = Annotated[
-    str | None, typer.Option("--winch", help="Winch profile; default: the recorded one.")
+    str | None, option("Winch profile; default: the recorded one.", "--winch")
 ]
 RobotBusOption = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "simbus: (starts a simulator), simbus:NAME, or BUS=URL once for each bus.",
         "--bus",
-        help="simbus: (starts a simulator), simbus:NAME, or BUS=URL once for each bus.",
         metavar="URL",
     ),
 ]

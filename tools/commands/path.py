@@ -21,6 +21,8 @@ from cdpr_tools.commands.options import (
     RobotOption,
     SocketOption,
     UrlOption,
+    argument,
+    option,
     shares,
     written_as,
 )
@@ -68,47 +70,39 @@ class PathFile(NamedTuple):
 @contextmanager
 def _with_path(
     file: Annotated[
-        Path,
-        typer.Argument(help="Way points (.toml, .csv) or G-code (.nc, .ngc, .gcode, .tap, .cnc)."),
+        Path, argument("Way points (.toml, .csv) or G-code (.nc, .ngc, .gcode, .tap, .cnc).")
     ],
     origin: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Position of G-code's zero in the room, in mm; 'X Y Z G55 X Y Z' for two zeros.",
             metavar="'X Y Z'",
-            help="Position of G-code's zero in the room, in mm; 'X Y Z G55 X Y Z' for two zeros.",
         ),
     ] = None,
     blend: Annotated[
         float,
-        typer.Option(
+        option(
+            "Tolerance in mm for cutting corners of G-code without G61 or G64 P.",
             min=0.0,
             max=1000.0,
-            help="Tolerance in mm for cutting corners of G-code without G61 or G64 P.",
         ),
     ] = 1.0,
     ignore: Annotated[
         str,
-        typer.Option(
+        option(
+            "G-code letters to drop, and M codes and macros whose lines are skipped.",
             metavar="'U M777 ...'",
-            help="G-code letters to drop, and M codes and macros whose lines are skipped.",
         ),
     ] = "",
-    z: Annotated[
-        float | None, typer.Option(min=-1e6, max=1e6, help="Z in mm, for G-code without Z.")
-    ] = None,
+    z: Annotated[float | None, option("Z in mm, for G-code without Z.", min=-1e6, max=1e6)] = None,
     scale: Annotated[
-        float,
-        typer.Option(min=1e-3, max=1e3, help="Scale factor of G-code's lengths, but not of F."),
+        float, option("Scale factor of G-code's lengths, but not of F.", min=1e-3, max=1e3)
     ] = 1.0,
-    rotate: Annotated[
-        float, typer.Option(min=-360.0, max=360.0, help="Turn G-code around Z, degrees.")
-    ] = 0.0,
-    mirror: Annotated[
-        str, typer.Option(metavar="x|y", help="Change the sign of G-code's X or Y.")
-    ] = "",
-    dwell: Annotated[str, typer.Option(metavar="s|ms", help="Unit of P of G-code's G4.")] = "s",
+    rotate: Annotated[float, option("Turn G-code around Z, degrees.", min=-360.0, max=360.0)] = 0.0,
+    mirror: Annotated[str, option("Change the sign of G-code's X or Y.", metavar="x|y")] = "",
+    dwell: Annotated[str, option("Unit of P of G-code's G4.", metavar="s|ms")] = "s",
     line: Annotated[
-        int, typer.Option(min=0, help="Begin with this line of the file, at its start position.")
+        int, option("Begin with this line of the file, at its start position.", min=0)
     ] = 0,
     as_json: JsonOption = False,
 ) -> Iterator[tuple[PathFile, Output]]:
@@ -124,10 +118,10 @@ def _with_path(
 
 FeedOption = Annotated[
     float | None,
-    typer.Option(
+    option(
+        "Percent of the planned speed; by default 100, or as before when it is resumed.",
         min=1.0,
         max=100.0,
-        help="Percent of the planned speed; by default 100, or as before when it is resumed.",
     ),
 ]
 
@@ -139,25 +133,25 @@ def show(
     out: Output,
     robot: Annotated[
         str,
-        typer.Option(
-            "--robot",
-            help="Robot profile, a name or a file, or the name of a daemon's robot; "
+        option(
+            "Robot profile, a name or a file, or the name of a daemon's robot; "
             f"{ROBOT_VARIABLE} is its default.",
+            "--robot",
             envvar=ROBOT_VARIABLE,
         ),
     ],
     picture: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Draw it into NAME.png.",
             "--png",
             "--picture",
             metavar="FILE",
-            help="Draw it into NAME.png.",
             callback=written_as(".png"),
         ),
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--keep", help="Store the plan for the robot's daemon, under its name.")
+        bool, option("Store the plan for the robot's daemon, under its name.", "--keep")
     ] = False,
 ) -> None:
     """Plan a path and show its duration, tensions and first problem; nothing moves.
@@ -208,9 +202,7 @@ def resume(
 
 @app.command()
 def back(
-    distance: Annotated[
-        float, typer.Argument(min=0.1, metavar="MM", help="How far, in mm along the path.")
-    ],
+    distance: Annotated[float, argument("How far, in mm along the path.", min=0.1, metavar="MM")],
     feed: FeedOption = None,
     robot: RobotOption = None,
     socket: SocketOption = None,

@@ -15,7 +15,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.reachable import SHARE, Reach
-from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, SeedOption
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, SeedOption, option
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.number_options import numbers, numbers_command
 from cdpr_tools.output import Output
@@ -29,39 +29,33 @@ _SHOWN = 5
 @app.command(cls=numbers_command("--from"))
 def poses(
     robot: RobotArgument,
-    count: Annotated[
-        int, typer.Option("-n", "--count", min=1, max=100_000, help="Number of poses.")
-    ] = 100,
+    count: Annotated[int, option("Number of poses.", "-n", "--count", min=1, max=100_000)] = 100,
     start: Annotated[
-        str | None,
-        typer.Option("--from", metavar="X Y [Z]", help="Start of all ways, in mm; default: home."),
+        str | None, option("Start of all ways, in mm; default: home.", "--from", metavar="X Y [Z]")
     ] = None,
     seed: SeedOption = 1,
     by: Annotated[
         Choose,
-        typer.Option(
-            "--choose",
-            help="Which poses to choose: as drawn, far from each other, or with most "
+        option(
+            "Which poses to choose: as drawn, far from each other, or with most "
             "information about exit points and initial lengths.",
+            "--choose",
         ),
     ] = Choose.RANDOM,
     angle: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Largest rotation from home's orientation; default: as for targets.",
             min=0.0,
             max=179.0,
             metavar="DEG",
-            help="Largest rotation from home's orientation; default: as for targets.",
         ),
     ] = None,
     share: Annotated[
-        float,
-        typer.Option(
-            min=0.01, max=1.0, help="Share of the way to use if it ends before its target."
-        ),
+        float, option("Share of the way to use if it ends before its target.", min=0.01, max=1.0)
     ] = SHARE,
     out_file: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="NAME.csv or NAME.toml, in m, rad.")
+        Path | None, option("NAME.csv or NAME.toml, in m, rad.", "--out", metavar="FILE")
     ] = None,
     png: PngOption = None,
     as_json: JsonOption = False,

@@ -13,7 +13,7 @@ import cdpr_profiles as catalogue
 from cdpr_profiles import RobotAxis
 from cdpr_profiles.catalogue import load_profile
 from cdpr_profiles.reader import closest
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, argument
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 
@@ -27,7 +27,7 @@ app = typer.Typer(
 @app.command("list")
 def list_(
     kind: Annotated[
-        str | None, typer.Argument(help="Only these: robots, winches, ...", metavar="[KIND]")
+        str | None, argument("Only these: robots, winches, ...", metavar="[KIND]")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -46,7 +46,7 @@ def list_(
 
 @app.command()
 def show(
-    name: Annotated[str, typer.Argument(help="A name from `cdpr profiles list`.")],
+    name: Annotated[str, argument("A name from `cdpr profiles list`.")],
     as_json: JsonOption = False,
 ) -> None:
     """Show all values of a profile."""

@@ -18,7 +18,7 @@ from cdpr_drivers.rails.rail_session import (
 )
 from cdpr_profiles.rail import load_rail
 from cdpr_rt.model.calibration_state import calibration_state
-from cdpr_tools.commands.options import JsonOption, SafetyIoOption, YesOption
+from cdpr_tools.commands.options import JsonOption, SafetyIoOption, YesOption, argument, option
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
@@ -27,14 +27,12 @@ from cdpr_tools.signals import stop_on_signals
 app = typer.Typer(name="rail", help="Move the rails that carry the winches.", no_args_is_help=True)
 
 _RailArgument = Annotated[
-    str, typer.Argument(help="Rail profile: a name or the path of a file.", metavar="RAIL")
+    str, argument("Rail profile: a name or the path of a file.", metavar="RAIL")
 ]
 _BusOption = Annotated[
     str | None,
-    typer.Option(
-        "--bus",
-        help="CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ...",
-        metavar="URL",
+    option(
+        "CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ...", "--bus", metavar="URL"
     ),
 ]
 
@@ -78,26 +76,22 @@ def reset(
 @app.command("move")
 def move_(
     rail: _RailArgument,
-    to_m: Annotated[float, typer.Option("--to", help="Target position, in m.", metavar="M")],
+    to_m: Annotated[float, option("Target position, in m.", "--to", metavar="M")],
     bus: _BusOption = None,
     safety_io: SafetyIoOption = None,
     sensors: Annotated[
-        str | None,
-        typer.Option(help="Tension sensors, to check that the cables are slack."),
+        str | None, option("Tension sensors, to check that the cables are slack.")
     ] = None,
     tension_port: Annotated[
-        str | None, typer.Option(help="Serial line of the tension sensors.", metavar="TTY")
+        str | None, option("Serial line of the tension sensors.", metavar="TTY")
     ] = None,
     cables_slack_checked: Annotated[
-        bool,
-        typer.Option(
-            "--cables-slack-checked", help="Confirm that you have seen all cables hang slack."
-        ),
+        bool, option("Confirm that you have seen all cables hang slack.", "--cables-slack-checked")
     ] = False,
     winch_bus: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Another CAN bus with winches, whose drives must have no power; may be repeated.",
+        option(
+            "Another CAN bus with winches, whose drives must have no power; may be repeated.",
             metavar="URL",
         ),
     ] = None,

@@ -21,7 +21,7 @@ from cdpr_rt import offline
 from cdpr_rt.diagnosis import checks
 from cdpr_rt.diagnosis.subject import Finding, Subject
 from cdpr_rt.model.calibration_state import mark_calibrated
-from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, argument, option
 from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
 from cdpr_tools.robots import new_robot, summary
@@ -81,15 +81,15 @@ def pose(
     robot: RobotArgument,
     table: Annotated[
         Path,
-        typer.Argument(
-            metavar="TABLE",
-            help="CSV with the columns length_1_m, length_2_m, ... and, if measured, tension_1_N, "
+        argument(
+            "CSV with the columns length_1_m, length_2_m, ... and, if measured, tension_1_N, "
             "... at the winches, roll_rad and pitch_rad, time_s, and the pose: x_m y_m z_m, "
             "qw qx qy qz.",
+            metavar="TABLE",
         ),
     ],
     poses: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write the poses, NAME.csv.")
+        Path | None, option("Write the poses, NAME.csv.", "--out", metavar="FILE")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -135,7 +135,7 @@ def pose(
 @app.command("mark-calibrated")
 def mark_calibrated_(
     robot: RobotArgument,
-    why: Annotated[str, typer.Option("--why", help="How you know the exit points in its file.")],
+    why: Annotated[str, option("How you know the exit points in its file.", "--why")],
     as_json: JsonOption = False,
 ) -> None:
     """Confirm the geometry in the robot's file, e.g. after moving a rail."""
@@ -147,19 +147,17 @@ def mark_calibrated_(
 
 @app.command()
 def new(
-    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    path: Annotated[Path, argument("The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key lists "
+            "all keys.",
             "--set",
             metavar="KEY=VALUE",
-            help="Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key lists "
-            "all keys.",
         ),
     ] = None,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Use the defaults for all other questions.")
-    ] = False,
+    yes: Annotated[bool, option("Use the defaults for all other questions.", "--yes")] = False,
     png: PngOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -188,19 +186,15 @@ def new(
 
 @app.command("import")
 def import_(
-    bodies: Annotated[
-        Path, typer.Argument(help="The model's file of bodies, XML.", metavar="BODIES")
-    ],
-    cables: Annotated[
-        Path, typer.Argument(help="The model's file of cables, XML.", metavar="CABLES")
-    ],
-    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    bodies: Annotated[Path, argument("The model's file of bodies, XML.", metavar="BODIES")],
+    cables: Annotated[Path, argument("The model's file of cables, XML.", metavar="CABLES")],
+    path: Annotated[Path, argument("The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "Answer as for `cdpr robot new`, such as winch=NAME; may be repeated.",
             "--set",
             metavar="KEY=VALUE",
-            help="Answer as for `cdpr robot new`, such as winch=NAME; may be repeated.",
         ),
     ] = None,
     as_json: JsonOption = False,

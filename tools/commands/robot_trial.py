@@ -10,17 +10,8 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import load_robot
-from cdpr_tools.commands.options import (
-    AgainOption,
-    AllowCodeOption,
-    CommissionedOption,
-    ControllerOption,
-    JsonOption,
-    RobotArgument,
-    RobotPlantOption,
-    SeedOption,
-    TensionDistributionOption,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import loading_notice
@@ -44,42 +35,37 @@ app = typer.Typer()
 
 @app.command()
 def trial(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     kind: Annotated[
         KindOfTrial,
-        typer.Argument(
-            help="targets: accuracy at rest; line: lines and turns with and without "
+        argument(
+            "targets: accuracy at rest; line: lines and turns with and without "
             "compensation; random: targets at full speed; path: lines, arcs and cut "
             "corners of a G-code file; stream: set-points of a hand over a bad network; "
             "tape: exit points that differ from the robot's file by 20 to 50 mm."
         ),
     ],
-    plant: RobotPlantOption = None,
-    seed: SeedOption = 1,
+    plant: options.RobotPlantOption = None,
+    seed: options.SeedOption = 1,
     minutes: Annotated[
-        float | None,
-        typer.Option(min=0.05, max=600.0, help="Duration in bus time; not for line."),
+        float | None, option("Duration in bus time; not for line.", min=0.05, max=600.0)
     ] = None,
     speed_mm_s: Annotated[
-        float | None,
-        typer.Option(min=0.1, help="Speed; default: 10 for lines, the robot's for a path."),
+        float | None, option("Speed; default: 10 for lines, the robot's for a path.", min=0.1)
     ] = None,
-    commissioned: CommissionedOption = None,
-    controller: ControllerOption = None,
-    tension_distribution: TensionDistributionOption = None,
-    allow_code: AllowCodeOption = False,
+    commissioned: options.CommissionedOption = None,
+    controller: options.ControllerOption = None,
+    tension_distribution: options.TensionDistributionOption = None,
+    allow_code: options.AllowCodeOption = False,
     without_compensation: Annotated[
-        bool,
-        typer.Option("--without-compensation", help="Do not use commissioning results."),
+        bool, option("Do not use commissioning results.", "--without-compensation")
     ] = False,
     out_dir: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="New folder for recordings, true poses and picture.", metavar="DIR"
-        ),
+        option("New folder for recordings, true poses and picture.", "--out", metavar="DIR"),
     ] = None,
-    again: AgainOption = False,
-    as_json: JsonOption = False,
+    again: options.AgainOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Try a robot in simulation and judge its accuracy against the truth.
 

@@ -17,13 +17,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.rigid_body import directions_of
 from cdpr_rt.model.statics import Box, view_of
 from cdpr_rt.model.workspace_analysis import criterion_of, turns_within
-from cdpr_tools.commands.options import (
-    ClusterOption,
-    JsonOption,
-    PngOption,
-    RobotArgument,
-    written_as,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import option
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.number_options import numbers, numbers_command
 from cdpr_tools.output import Output
@@ -95,72 +90,62 @@ class _Typed:
 
 @app.command(cls=numbers_command("--rotate", "--centre", "--low", "--high"))
 def workspace(
-    robot: RobotArgument,
+    robot: options.RobotArgument,
     static: Annotated[
         bool,
-        typer.Option(
-            "--static", help="Workspace at rest, without the accelerations of the robot's file."
-        ),
+        option("Workspace at rest, without the accelerations of the robot's file.", "--static"),
     ] = False,
     margin: Annotated[
-        float, typer.Option(min=0.0, help="Margin that all tensions keep from their bounds, N.")
+        float, option("Margin that all tensions keep from their bounds, N.", min=0.0)
     ] = 0.0,
     rotate: Annotated[
         str | None,
-        typer.Option(
-            metavar="RX RY RZ | ANGLE",
-            help="Platform turned by this rotation vector from its orientation at home, in deg; "
+        option(
+            "Platform turned by this rotation vector from its orientation at home, in deg; "
             "in a plane one angle.",
+            metavar="RX RY RZ | ANGLE",
         ),
     ] = None,
     within: Annotated[
         float | None,
-        typer.Option(
-            metavar="DEG",
-            help="Places that allow all orientations up to this many deg from home's.",
+        option(
+            "Places that allow all orientations up to this many deg from home's.", metavar="DEG"
         ),
     ] = None,
     contact_free: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Exclude places where cables touch each other, the platform or obstacles.",
             "--contact-free",
-            help="Exclude places where cables touch each other, the platform or obstacles.",
         ),
     ] = False,
     low: Annotated[
-        str | None, typer.Option(metavar="X Y [Z]", help="Lower corner of the search, in mm.")
+        str | None, option("Lower corner of the search, in mm.", metavar="X Y [Z]")
     ] = None,
     high: Annotated[
         str | None,
-        typer.Option(
-            metavar="X Y [Z]", help="Upper corner of the search; by default around the whole robot."
-        ),
+        option("Upper corner of the search; by default around the whole robot.", metavar="X Y [Z]"),
     ] = None,
     centre: Annotated[
         str | None,
-        typer.Option(
-            metavar="X Y [Z]", help="Start of the rays, in mm; default: the middle of the targets."
-        ),
+        option("Start of the rays, in mm; default: the middle of the targets.", metavar="X Y [Z]"),
     ] = None,
-    rays: Annotated[int, typer.Option(min=20, max=1_000_000, help="Number of rays.")] = 5000,
-    cells: Annotated[
-        int, typer.Option(min=4, max=400, help="Cells of the grid along the longest side.")
-    ] = 60,
-    png: PngOption = None,
+    rays: Annotated[int, option("Number of rays.", min=20, max=1_000_000)] = 5000,
+    cells: Annotated[int, option("Cells of the grid along the longest side.", min=4, max=400)] = 60,
+    png: options.PngOption = None,
     mesh: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Write the grid's surface, in m: .stl, .ply or .obj.",
             "--mesh",
-            help="Write the grid's surface, in m: .stl, .ply or .obj.",
-            callback=written_as(*_MESHES),
+            callback=options.written_as(*_MESHES),
         ),
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=256, help="Number of processes; default: one for each core."),
+        int | None, option("Number of processes; default: one for each core.", min=1, max=256)
     ] = None,
-    cluster: ClusterOption = None,
-    as_json: JsonOption = False,
+    cluster: options.ClusterOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute where the cables can hold the platform.
 

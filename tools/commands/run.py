@@ -34,19 +34,9 @@ from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.service.listening import listener_pid
 from cdpr_rt.service.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_rt.state_file import make_private_folder
+from cdpr_tools.commands import options
 from cdpr_tools.commands.browser import open_page
-from cdpr_tools.commands.options import (
-    AllowCodeOption,
-    ControllerOption,
-    ExitWithStdinOption,
-    JsonOption,
-    ProgramOption,
-    RobotBusOption,
-    RobotOrWinchArgument,
-    SafetyIoOption,
-    TensionDistributionOption,
-    YesOption,
-)
+from cdpr_tools.commands.options import option
 from cdpr_tools.compiling import compiling_notices_to
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.composition.simulator import OwnSimulator
@@ -75,102 +65,86 @@ app = typer.Typer()
 
 @app.command()
 def run(
-    robot: RobotOrWinchArgument,
-    bus: RobotBusOption = None,
+    robot: options.RobotOrWinchArgument,
+    bus: options.RobotBusOption = None,
     plant: Annotated[
-        Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+        Path | None, option("Plant file for the simulator that `simbus:` starts.")
     ] = None,
     camera: Annotated[
-        Path | None,
-        typer.Option(help="Socket to create for a simulated camera on the platform."),
+        Path | None, option("Socket to create for a simulated camera on the platform.")
     ] = None,
     http: Annotated[
         str | None,
-        typer.Option(
-            metavar="HOST:PORT", help="Listen at this address, not at a free port of loopback."
-        ),
+        option("Listen at this address, not at a free port of loopback.", metavar="HOST:PORT"),
     ] = None,
     no_page: Annotated[
-        bool, typer.Option("--no-page", help="Serve no page for a browser: listen at no port.")
+        bool, option("Serve no page for a browser: listen at no port.", "--no-page")
     ] = False,
-    open_it: Annotated[
-        bool, typer.Option("--open", help="Open the robot's page in a browser.")
-    ] = False,
+    open_it: Annotated[bool, option("Open the robot's page in a browser.", "--open")] = False,
     unix: Annotated[
-        Path | None,
-        typer.Option("--socket", help="Unix socket of the control interface, if not the default."),
+        Path | None, option("Unix socket of the control interface, if not the default.", "--socket")
     ] = None,
     key_file: Annotated[
         Path | None,
-        typer.Option(
-            help="File with the key of clients that may move the robot over --http or --stream."
-        ),
+        option("File with the key of clients that may move the robot over --http or --stream."),
     ] = None,
     record: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Record into this folder instead of the default one."),
+        Path | None, option("Record into this folder instead of the default one.", metavar="DIR")
     ] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Record nothing.")] = False,
+    no_record: Annotated[bool, option("Record nothing.", "--no-record")] = False,
     keep_days: Annotated[
         float | None,
-        typer.Option(
-            min=0.01,
-            help="Remove older recordings of this robot; default: 30 in the user's folder.",
+        option(
+            "Remove older recordings of this robot; default: 30 in the user's folder.", min=0.01
         ),
     ] = None,
     keep_gb: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Remove its oldest recordings above this total size; default: 20 in the user's folder.",
             "--keep-gb",
             min=0.01,
-            help="Remove its oldest recordings above this total size; default: 20 in the user's "
-            "folder.",
         ),
     ] = None,
     live: Annotated[
-        int | None,
-        typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+        int | None, option("Foxglove live view, on loopback.", metavar="PORT", min=0, max=65535)
     ] = None,
     live_origin: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "A web page that may use the live view, such as https://app.foxglove.dev.",
             metavar="ORIGIN",
-            help="A web page that may use the live view, such as https://app.foxglove.dev.",
         ),
     ] = None,
     stream: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Receive the set-point stream (UDP) there, not at a free port of loopback.",
             metavar="HOST:PORT",
-            help="Receive the set-point stream (UDP) there, not at a free port of loopback.",
         ),
     ] = None,
-    no_stream: Annotated[
-        bool, typer.Option("--no-stream", help="Receive no set-point stream.")
-    ] = False,
+    no_stream: Annotated[bool, option("Receive no set-point stream.", "--no-stream")] = False,
     read_only: Annotated[
-        bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
+        bool, option("Listen to another master's bus; send nothing.", "--read-only")
     ] = False,
-    safety_io: SafetyIoOption = None,
+    safety_io: options.SafetyIoOption = None,
     tension_port: Annotated[
-        str | None,
-        typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
+        str | None, option("Serial port of the robot's tension sensors.", metavar="PORT")
     ] = None,
     commissioned: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Folder with the results of `cdpr commission ROBOT`, used to compensate the motors.",
             metavar="DIR",
-            help="Folder with the results of `cdpr commission ROBOT`, used to compensate the "
-            "motors.",
         ),
     ] = None,
-    controller: ControllerOption = None,
-    tension_distribution: TensionDistributionOption = None,
-    program: ProgramOption = None,
-    allow_code: AllowCodeOption = False,
-    yes: YesOption = False,
-    as_json: JsonOption = False,
-    exit_with_stdin: ExitWithStdinOption = False,
+    controller: options.ControllerOption = None,
+    tension_distribution: options.TensionDistributionOption = None,
+    program: options.ProgramOption = None,
+    allow_code: options.AllowCodeOption = False,
+    yes: options.YesOption = False,
+    as_json: options.JsonOption = False,
+    exit_with_stdin: options.ExitWithStdinOption = False,
 ) -> None:
     """Start a robot's control loop as a daemon. The motors get no power until you enable them.
 
@@ -223,11 +197,9 @@ def run(
 
 @app.command()
 def demo(
-    robot: Annotated[
-        str, typer.Option("--robot", help="Robot profile, a name or a file.")
-    ] = "planar-3",
+    robot: Annotated[str, option("Robot profile, a name or a file.", "--robot")] = "planar-3",
     no_open: Annotated[
-        bool, typer.Option("--no-open", help="Open no browser; print the page's address.")
+        bool, option("Open no browser; print the page's address.", "--no-open")
     ] = False,
 ) -> None:
     """Start a simulated robot and open its page in a browser.

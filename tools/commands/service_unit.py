@@ -20,7 +20,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_rt.model.robot_arrays import can_lower
 from cdpr_rt.programs.lower import lowering_s
 from cdpr_tools.commands import run
-from cdpr_tools.commands.options import RobotOrWinchArgument
+from cdpr_tools.commands.options import RobotOrWinchArgument, option
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.page import rendered
@@ -43,8 +43,7 @@ def print_unit(
     context: typer.Context,
     robot: RobotOrWinchArgument,
     user: Annotated[
-        str | None,
-        typer.Option(help="User that runs it; by default you, or `cdpr` if you are root."),
+        str | None, option("User that runs it; by default you, or `cdpr` if you are root.")
     ] = None,
 ) -> None:
     """Print a systemd unit that runs the robot's daemon.

@@ -17,15 +17,15 @@ from cdpr_sim_bus.camera.sim_camera import Box, SimCamera, random_poses
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.camera_plant import CameraPlant
 from cdpr_tools.calibrate.pose_camera import images_of_board, ordered_sheets
-from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, SeedOption
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import require_free, save
 
 _PlantOption = Annotated[
-    Path | None,
-    typer.Option(help="Camera's plant file: the truth about lens, mount, light and markers."),
+    Path | None, option("Camera's plant file: the truth about lens, mount, light and markers.")
 ]
 
 app = typer.Typer()
@@ -33,12 +33,10 @@ app = typer.Typer()
 
 @app.command()
 def camera(
-    socket: Annotated[Path, typer.Argument(help="Unix socket to create.", metavar="SOCKET")],
-    board: Annotated[
-        Path, typer.Option(help="Physics board of the robot that carries the camera.")
-    ],
+    socket: Annotated[Path, argument("Unix socket to create.", metavar="SOCKET")],
+    board: Annotated[Path, option("Physics board of the robot that carries the camera.")],
     plant: _PlantOption = None,
-    exit_with_stdin: ExitWithStdinOption = False,
+    exit_with_stdin: options.ExitWithStdinOption = False,
 ) -> None:
     """Run a camera on a simulated platform until Ctrl-C; other commands use it as sim:SOCKET.
 
@@ -56,24 +54,24 @@ def camera(
 
 @app.command()
 def photos(
-    folder: Annotated[Path, typer.Argument(help="New folder for the images.", metavar="FOLDER")],
+    folder: Annotated[Path, argument("New folder for the images.", metavar="FOLDER")],
     plant: _PlantOption = None,
-    count: Annotated[int, typer.Option(min=1, max=2000, help="Number of images.")] = 40,
-    seed: SeedOption = 1,
+    count: Annotated[int, option("Number of images.", min=1, max=2000)] = 40,
+    seed: options.SeedOption = 1,
     low: Annotated[
-        str, typer.Option(help="Lowest position of the platform, m.", metavar='"X Y Z"')
+        str, option("Lowest position of the platform, m.", metavar='"X Y Z"')
     ] = "-0.5 -0.4 1.4",
     high: Annotated[
-        str, typer.Option(help="Highest position of the platform, m.", metavar='"X Y Z"')
+        str, option("Highest position of the platform, m.", metavar='"X Y Z"')
     ] = "0.2 0.6 1.75",
-    tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
+    tilt_deg: Annotated[float, option("Most rotation.", min=0.0, max=80.0)] = 15.0,
     board: Annotated[
-        bool, typer.Option("--board", help="Show a ChArUco board from near, for its lens.")
+        bool, option("Show a ChArUco board from near, for its lens.", "--board")
     ] = False,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that are already in FOLDER.")
+        bool, option("Replace files that are already in FOLDER.", "--overwrite")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write images of a simulated camera from random poses, and its intrinsics.
 

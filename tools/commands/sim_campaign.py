@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdpr_tools.commands.options import ClusterOption, JsonOption
+from cdpr_tools.commands.options import ClusterOption, JsonOption, argument, option
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -24,28 +24,25 @@ _EXPECTED_S = 4.0
 @app.command()
 def campaign(
     robots: Annotated[
-        list[str] | None, typer.Argument(help="Robots with a platform.", metavar="ROBOT...")
+        list[str] | None, argument("Robots with a platform.", metavar="ROBOT...")
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds.")] = 60,
-    first: Annotated[int, typer.Option("--from", min=0, help="First seed.")] = 0,
+    seeds: Annotated[int, option("Number of seeds.", min=1)] = 60,
+    first: Annotated[int, option("First seed.", "--from", min=0)] = 0,
     workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=256, help="Number of processes; default: one for each core."),
+        int | None, option("Number of processes; default: one for each core.", min=1, max=256)
     ] = None,
     cluster: ClusterOption = None,
     replay: Annotated[
-        int | None, typer.Option(min=0, metavar="SEED", help="Repeat one seed with a recording.")
+        int | None, option("Repeat one seed with a recording.", min=0, metavar="SEED")
     ] = None,
     shrink: Annotated[
-        int | None,
-        typer.Option(min=0, metavar="SEED", help="Print the smallest script that fails like this."),
+        int | None, option("Print the smallest script that fails like this.", min=0, metavar="SEED")
     ] = None,
     script: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Play this script instead of seeds.")
+        Path | None, option("Play this script instead of seeds.", metavar="FILE")
     ] = None,
     target: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for the recording and the picture."),
+        Path | None, option("Folder for the recording and the picture.", "--out", metavar="DIR")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -22,7 +22,7 @@ from cdpr_sim_bus.devices.sim_rail import SimRail
 from cdpr_sim_bus.devices.sim_safety_io import SafetyPlant, SimSafetyIo
 from cdpr_sim_bus.physics_board import PhysicsBoard, SafetyIoFault, common_time
 from cdpr_sim_bus.robot.plant import Plant
-from cdpr_tools.commands.options import ExitWithStdinOption
+from cdpr_tools.commands.options import ExitWithStdinOption, argument, option
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _FAULTS = {fault.name.lower().replace("_", "-"): fault for fault in SafetyIoFault if fault.name}
@@ -34,16 +34,16 @@ app = typer.Typer()
 
 @app.command()
 def safety_io(
-    io: Annotated[str, typer.Argument(help="Safety I/O profile: a name or a file.", metavar="IO")],
+    io: Annotated[str, argument("Safety I/O profile: a name or a file.", metavar="IO")],
     board: Annotated[
         list[Path] | None,
-        typer.Option(help="Physics board whose axes are those of the profile; may be repeated."),
+        option("Physics board whose axes are those of the profile; may be repeated."),
     ] = None,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="Port of 127.0.0.1; 0: any free port.")
+        int | None, option("Port of 127.0.0.1; 0: any free port.", min=0, max=65535)
     ] = None,
     plant: Annotated[
-        Path | None, typer.Option(help="Plant file: delays and positions of the limit switches.")
+        Path | None, option("Plant file: delays and positions of the limit switches.")
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
@@ -71,12 +71,10 @@ def safety_io(
 @app.command()
 def panel(
     action: Annotated[
-        str, typer.Argument(help=f"press, release, mend, {', '.join(_FAULTS)}.", metavar="ACTION")
+        str, argument(f"press, release, mend, {', '.join(_FAULTS)}.", metavar="ACTION")
     ],
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the simulated safety I/O.")],
-    unit: Annotated[
-        int, typer.Option(help="The panel's unit, as `sim safety-io` prints it.")
-    ] = 247,
+    port: Annotated[int, option("Port of the simulated safety I/O.", min=1, max=65535)],
+    unit: Annotated[int, option("The panel's unit, as `sim safety-io` prints it.")] = 247,
 ) -> None:
     """Press or release the emergency stop of a simulated safety I/O, or break it."""
     if action in ("press", "release"):
@@ -104,30 +102,24 @@ def panel(
 
 @app.command()
 def rail(
-    rail_name: Annotated[
-        str, typer.Argument(help="Rail profile: a name or a file.", metavar="RAIL")
-    ],
+    rail_name: Annotated[str, argument("Rail profile: a name or a file.", metavar="RAIL")],
     bus: Annotated[
-        str | None, typer.Option(help="For CiA 402: simbus:NAME, opened here, or socketcan:IFACE.")
+        str | None, option("For CiA 402: simbus:NAME, opened here, or socketcan:IFACE.")
     ] = None,
     board: Annotated[
         Path | None,
-        typer.Option(
-            help="For CiA 402: physics board to create, for the brake. For Modbus: board of a "
+        option(
+            "For CiA 402: physics board to create, for the brake. For Modbus: board of a "
             "simulator in lockstep, whose time the rail uses."
         ),
     ] = None,
     lockstep: Annotated[
         bool,
-        typer.Option(
-            "--lockstep/--paced", help="For CiA 402: bus time follows the master, or the clock."
-        ),
+        option("For CiA 402: bus time follows the master, or the clock.", "--lockstep/--paced"),
     ] = False,
-    plant: Annotated[
-        Path | None, typer.Option(help="For CiA 402: the truth about motor and drive.")
-    ] = None,
+    plant: Annotated[Path | None, option("For CiA 402: the truth about motor and drive.")] = None,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="For Modbus: port of 127.0.0.1; 0: any.")
+        int | None, option("For Modbus: port of 127.0.0.1; 0: any.", min=0, max=65535)
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:

@@ -13,6 +13,7 @@ from cdpr_profiles.errors import printable
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_sim_bus.cia402.faults import FAULTS, MEND
 from cdpr_tools.command_group import ROBOT_VARIABLE
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.composition.fault_injection import fault_access, named_fault
 from cdpr_tools.errors import BadInputError
 
@@ -33,36 +34,31 @@ app = typer.Typer()
 def fault(
     machine: Annotated[
         str,
-        typer.Argument(
-            help="Robot or winch that is simulated, or the name of its daemon.",
+        argument(
+            "Robot or winch that is simulated, or the name of its daemon.",
             metavar="ROBOT|WINCH",
             envvar=ROBOT_VARIABLE,
         ),
     ],
     what: Annotated[
         FaultWord,
-        typer.Argument(
-            help=f"Fault to inject immediately: {', '.join(FAULTS)}; {MEND}: repair everything; "
+        argument(
+            f"Fault to inject immediately: {', '.join(FAULTS)}; {MEND}: repair everything; "
             f"{LIST}: show what is broken.",
             metavar="FAULT",
         ),
     ],
     value: Annotated[
-        str | None,
-        typer.Argument(
-            help=f"Size of the fault, by default {_USUAL}.",
-            metavar="VALUE",
-        ),
+        str | None, argument(f"Size of the fault, by default {_USUAL}.", metavar="VALUE")
     ] = None,
     *,
     bus: Annotated[
-        list[str] | None,
-        typer.Option(help="The simulator's buses; default: those of the robot's daemon."),
+        list[str] | None, option("The simulator's buses; default: those of the robot's daemon.")
     ] = None,
     axis: Annotated[
         str | None,
-        typer.Option(
-            help="Axis by its name, or by its number from 1; 1 if left out, to mend and to list "
+        option(
+            "Axis by its name, or by its number from 1; 1 if left out, to mend and to list "
             "all of them."
         ),
     ] = None,

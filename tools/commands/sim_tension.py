@@ -14,7 +14,7 @@ from cdpr_sim_bus.devices.modbus_servers import serve_rtu
 from cdpr_sim_bus.devices.sim_inclinometer import SimInclinometer
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant, SimAmplifier
 from cdpr_sim_bus.physics_board import PhysicsBoard, common_time
-from cdpr_tools.commands.options import ExitWithStdinOption
+from cdpr_tools.commands.options import ExitWithStdinOption, argument, option
 from cdpr_tools.errors import BadInputError
 
 _MOST_KG = 1000.0
@@ -25,19 +25,13 @@ app = typer.Typer()
 
 @app.command()
 def tension(
-    sensors: Annotated[
-        str, typer.Argument(help="Tension sensors: a name or a file.", metavar="SENSORS")
-    ],
+    sensors: Annotated[str, argument("Tension sensors: a name or a file.", metavar="SENSORS")],
     board: Annotated[
-        list[Path],
-        typer.Option(help="Physics board whose axes are the sensors' cables; may be repeated."),
+        list[Path], option("Physics board whose axes are the sensors' cables; may be repeated.")
     ],
-    plant: Annotated[
-        Path | None, typer.Option(help="Plant file: the truth about the amplifiers.")
-    ] = None,
+    plant: Annotated[Path | None, option("Plant file: the truth about the amplifiers.")] = None,
     fault: Annotated[
-        list[str] | None,
-        typer.Option(help='Faults from the start, such as "silent 3" or "wrong-crc all".'),
+        list[str] | None, option('Faults from the start, such as "silent 3" or "wrong-crc all".')
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
@@ -76,11 +70,9 @@ def tension(
 
 @app.command()
 def hang(
-    mass_kg: Annotated[
-        float, typer.Argument(min=0.0, max=_MOST_KG, metavar="MASS_KG", help="Mass, kg.")
-    ],
-    board: Annotated[Path, typer.Option(help="Physics board of the simulator.")],
-    axis: Annotated[int, typer.Option(min=1, help="Axis, counted from 1.")] = 1,
+    mass_kg: Annotated[float, argument("Mass, kg.", min=0.0, max=_MOST_KG, metavar="MASS_KG")],
+    board: Annotated[Path, option("Physics board of the simulator.")],
+    axis: Annotated[int, option("Axis, counted from 1.", min=1)] = 1,
 ) -> None:
     """Hang a mass on a simulated cable whose plant has load.kind = "hung_mass"."""
     with PhysicsBoard.attach(board) as shared:

@@ -27,7 +27,7 @@ from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_sim_bus.robot.truth_log import BoardPose, MotorsLog, PoseLog, PoseScanner
-from cdpr_tools.commands.options import ExitWithStdinOption, RobotOrWinchArgument
+from cdpr_tools.commands.options import ExitWithStdinOption, RobotOrWinchArgument, option
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.robot_physics import physics_of
 from cdpr_tools.composition.simulator import OwnCamera
@@ -41,65 +41,51 @@ def up(
     machine: RobotOrWinchArgument,
     bus: Annotated[
         list[str],
-        typer.Option(
-            help="simbus:NAME, opened here, or socketcan:IFACE; for a robot also BUS=URL, each bus."
-        ),
+        option("simbus:NAME, opened here, or socketcan:IFACE; for a robot also BUS=URL, each bus."),
     ],
-    plant: Annotated[
-        Path | None, typer.Option(help="Plant file: the truth about motor and drive.")
-    ] = None,
+    plant: Annotated[Path | None, option("Plant file: the truth about motor and drive.")] = None,
     lockstep: Annotated[
-        bool,
-        typer.Option("--lockstep/--paced", help="Bus time follows the SYNCs, or the clock."),
+        bool, option("Bus time follows the SYNCs, or the clock.", "--lockstep/--paced")
     ] = True,
     nodes: Annotated[
-        int, typer.Option(min=1, max=16, help="Number of drives, with consecutive node ids.")
+        int, option("Number of drives, with consecutive node ids.", min=1, max=16)
     ] = 1,
     truth_log: Annotated[
-        Path | None,
-        typer.Option(help="Write the true motion, or pose, to this file (one drive, or a robot)."),
+        Path | None, option("Write the true motion, or pose, to this file (one drive, or a robot).")
     ] = None,
     scanner: Annotated[
-        Path | None,
-        typer.Option(help="Write the platform's pose to this file, measured with errors."),
+        Path | None, option("Write the platform's pose to this file, measured with errors.")
     ] = None,
     frame_log: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Write every frame with its bus time to this file, in candump format.",
             "--frame-log",
             envvar="CDPR_SIM_FRAME_LOG",
-            help="Write every frame with its bus time to this file, in candump format.",
         ),
     ] = None,
     unconfigured: Annotated[
-        bool, typer.Option("--unconfigured", help="New drives: without node ids, waiting for LSS.")
+        bool, option("New drives: without node ids, waiting for LSS.", "--unconfigured")
     ] = False,
     store: Annotated[
-        Path | None,
-        typer.Option(help="Folder for parameters that the drives store (1010h, LSS)."),
+        Path | None, option("Folder for parameters that the drives store (1010h, LSS).")
     ] = None,
     slcan: Annotated[
-        bool, typer.Option("--slcan", help="Also offer the bus as a serial CAN adapter.")
+        bool, option("Also offer the bus as a serial CAN adapter.", "--slcan")
     ] = False,
     socketcand: Annotated[
         int | None,
-        typer.Option(
-            metavar="PORT", min=0, max=65535, help="Serve socketcand on 127.0.0.1:PORT; 0: any."
-        ),
+        option("Serve socketcand on 127.0.0.1:PORT; 0: any.", metavar="PORT", min=0, max=65535),
     ] = None,
     detached: Annotated[
-        bool,
-        typer.Option("--detached", help="Simulate the motors of a robot without their cables."),
+        bool, option("Simulate the motors of a robot without their cables.", "--detached")
     ] = False,
     board: Annotated[
         Path | None,
-        typer.Option(
-            help="Create this file, a physics board for simulated sensors and safety I/O."
-        ),
+        option("Create this file, a physics board for simulated sensors and safety I/O."),
     ] = None,
     camera: Annotated[
-        Path | None,
-        typer.Option(help="Unix socket to create for a camera on a robot's platform: sim:SOCKET."),
+        Path | None, option("Unix socket to create for a camera on a robot's platform: sim:SOCKET.")
     ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
@@ -252,9 +238,9 @@ def _require_simulated(text: str, url: BusUrl) -> None:
 
 def _refuse_platforms(scanner: Path | None, camera: Path | None) -> None:
     """Raise BadInputError for options that need a platform, which the robot lacks."""
-    for option, path in (("--scanner", scanner), ("--camera", camera)):
+    for name, path in (("--scanner", scanner), ("--camera", camera)):
         if path is not None:
-            raise BadInputError(f"{option}: for a robot with its platform on the cables")
+            raise BadInputError(f"{name}: for a robot with its platform on the cables")
 
 
 def _record(

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import JsonOption, argument, option
 from cdpr_tools.errors import BAD_INPUT, BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.repeat import Run, Stops, Verdict, compare, run_once
@@ -29,24 +29,20 @@ app = typer.Typer()
 def verify(
     command: Annotated[
         list[str],
-        typer.Argument(
-            help="After --: the arguments of `cdpr`, or the path of a program (with a /).",
+        argument(
+            "After --: the arguments of `cdpr`, or the path of a program (with a /).",
             metavar="-- COMMAND...",
         ),
     ],
-    runs: Annotated[int, typer.Option(min=2, max=1000, help="Number of runs.")] = 2,
+    runs: Annotated[int, option("Number of runs.", min=2, max=1000)] = 2,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Random seed of the disturbances; default: random.")
+        int | None, option("Random seed of the disturbances; default: random.", min=0)
     ] = None,
     busy: Annotated[
         int | None,
-        typer.Option(
-            min=0, help="Number of busy processes beside it; default: one more than cores."
-        ),
+        option("Number of busy processes beside it; default: one more than cores.", min=0),
     ] = None,
-    keep: Annotated[
-        Path | None, typer.Option(help="New folder for all output.", metavar="DIR")
-    ] = None,
+    keep: Annotated[Path | None, option("New folder for all output.", metavar="DIR")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a command several times on simulated drives and compare all files.

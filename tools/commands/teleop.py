@@ -15,17 +15,8 @@ from typer.core import TyperGroup
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import load_robot
 from cdpr_tools.command_group import ROBOT_VARIABLE
-from cdpr_tools.commands.options import (
-    AgainOption,
-    CommissionedOption,
-    JsonOption,
-    KeyFileOption,
-    RobotArgument,
-    RobotPlantOption,
-    SeedOption,
-    SocketOption,
-    UrlOption,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.output import Output
 from cdpr_tools.teleop.gamepad import EvdevFinder, Gamepad, stick_map
@@ -70,65 +61,57 @@ class Device(StrEnum):
 @app.command(_LEAD)
 def robot(
     robot: Annotated[
-        str,
-        typer.Argument(
-            help="Robot whose daemon is running.", metavar="ROBOT", envvar=ROBOT_VARIABLE
-        ),
+        str, argument("Robot whose daemon is running.", metavar="ROBOT", envvar=ROBOT_VARIABLE)
     ],
-    device: Annotated[Device, typer.Option("--device", help="Input device.")] = Device.KEYBOARD,
+    device: Annotated[Device, option("Input device.", "--device")] = Device.KEYBOARD,
     scale: Annotated[
-        str,
-        typer.Option(metavar="ROBOT:HAND", help="Robot motion over hand motion; or a number."),
+        str, option("Robot motion over hand motion; or a number.", metavar="ROBOT:HAND")
     ] = "1:1",
     script: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="For --device script; each line: SECONDS X_MM Y_MM, then optionally z=MM, "
+        option(
+            "For --device script; each line: SECONDS X_MM Y_MM, then optionally z=MM, "
             "turn=RX,RY,RZ (deg), clutch, confirm.",
+            metavar="FILE",
         ),
     ] = None,
     via: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Send the stream to this address instead, for example a tunnel or proxy.",
             metavar="HOST:PORT",
-            help="Send the stream to this address instead, for example a tunnel or proxy.",
         ),
     ] = None,
     input_path: Annotated[
         Path | None,
-        typer.Option("--input", help="The gamepad's device node; default: the first suitable one."),
+        option("The gamepad's device node; default: the first suitable one.", "--input"),
     ] = None,
     axes: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Axes that move the platform; - reverses one. Default: left stick, directional pad.",
             metavar="X,Y[,Z]",
-            help="Axes that move the platform; - reverses one. Default: left stick, directional "
-            "pad.",
         ),
     ] = None,
     turn_axes: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Axes that turn the platform. Default: right stick, directional pad.",
             metavar="AXIS[,...]",
-            help="Axes that turn the platform. Default: right stick, directional pad.",
         ),
     ] = None,
-    dead_man: Annotated[
-        str, typer.Option(help="Button to hold while the stick moves the robot.")
-    ] = "BTN_TR",
-    confirm: Annotated[str, typer.Option(help="Button that confirms a target.")] = "BTN_SOUTH",
+    dead_man: Annotated[str, option("Button to hold while the stick moves the robot.")] = "BTN_TR",
+    confirm: Annotated[str, option("Button that confirms a target.")] = "BTN_SOUTH",
     dead_zone: Annotated[
-        float,
-        typer.Option(min=0.0, max=0.9, help="Dead zone of the stick, as a share of its travel."),
+        float, option("Dead zone of the stick, as a share of its travel.", min=0.0, max=0.9)
     ] = 0.1,
     hand_speed: Annotated[
-        float, typer.Option(min=0.1, max=1000.0, help="Hand speed at full deflection, mm/s.")
+        float, option("Hand speed at full deflection, mm/s.", min=0.1, max=1000.0)
     ] = 50.0,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
-    as_json: JsonOption = False,
+    socket: options.SocketOption = None,
+    url: options.UrlOption = None,
+    key_file: options.KeyFileOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Move a robot that has power by hand, through its daemon's set-point stream.
 
@@ -143,9 +126,9 @@ def robot(
     if (device is Device.SCRIPT) != (script is not None):
         raise BadInputError("--script: required with --device script, and allowed only there")
     of_gamepad = (("--input", input_path), ("--axes", axes), ("--turn-axes", turn_axes))
-    for option, given in of_gamepad if device is not Device.GAMEPAD else ():
+    for name, given in of_gamepad if device is not Device.GAMEPAD else ():
         if given is not None:
-            raise BadInputError(f"{option} {given}: allowed only with --device gamepad")
+            raise BadInputError(f"{name} {given}: allowed only with --device gamepad")
 
     def open_device(directions: Directions) -> InputDevice:
         """Open the device; called after everything else has been checked."""
@@ -168,44 +151,40 @@ _LONGEST_ROUND_TRIP_ms = 10_000
 
 @app.command()
 def experiment(
-    robot: RobotArgument = "planar-3",
-    plant: RobotPlantOption = None,
-    commissioned: CommissionedOption = None,
+    robot: options.RobotArgument = "planar-3",
+    plant: options.RobotPlantOption = None,
+    commissioned: options.CommissionedOption = None,
     without_compensation: Annotated[
-        bool, typer.Option("--without-compensation", help="Do not use commissioning results.")
+        bool, option("Do not use commissioning results.", "--without-compensation")
     ] = False,
-    places: Annotated[str, typer.Option(help="Places of the pattern.")] = "A,B,C",
-    scales: Annotated[str, typer.Option(help="Scales, robot to hand.")] = "8:1,4:1,2:1",
-    round_trips: Annotated[str, typer.Option(help="Round-trip delays, ms.")] = "0,350,730",
-    repeats: Annotated[int, typer.Option(min=1, max=100, help="Runs of each condition.")] = 2,
+    places: Annotated[str, option("Places of the pattern.")] = "A,B,C",
+    scales: Annotated[str, option("Scales, robot to hand.")] = "8:1,4:1,2:1",
+    round_trips: Annotated[str, option("Round-trip delays, ms.")] = "0,350,730",
+    repeats: Annotated[int, option("Runs of each condition.", min=1, max=100)] = 2,
     without_clutch: Annotated[
-        bool, typer.Option("--without-clutch", help="As in the thesis: no clutch.")
+        bool, option("As in the thesis: no clutch.", "--without-clutch")
     ] = False,
     unsteadied: Annotated[
-        bool, typer.Option("--unsteadied", help="As in the thesis: send tremor unfiltered.")
+        bool, option("As in the thesis: send tremor unfiltered.", "--unsteadied")
     ] = False,
     operator: Annotated[
         list[str] | None,
-        typer.Option(help="Set a parameter of the operator model; may be repeated.",
-                     metavar="NAME=VALUE"),
+        option("Set a parameter of the operator model; may be repeated.", metavar="NAME=VALUE"),
     ] = None,
     perfect_robot: Annotated[
-        bool, typer.Option("--perfect-robot", help="Simulate the operator with an ideal robot.")
+        bool, option("Simulate the operator with an ideal robot.", "--perfect-robot")
     ] = False,
-    seed: SeedOption = 1,
+    seed: options.SeedOption = 1,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Sessions in parallel; one for each core by default.")
+        int | None, option("Sessions in parallel; one for each core by default.", min=1)
     ] = None,
     out_dir: Annotated[
         Path | None,
-        typer.Option(
-            "--out", help="Folder for all data; continues an interrupted experiment.",
-            metavar="DIR",
-        ),
+        option("Folder for all data; continues an interrupted experiment.", "--out", metavar="DIR"),
     ] = None,
-    again: AgainOption = False,
-    as_json: JsonOption = False,
-) -> None:  # fmt: skip
+    again: options.AgainOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
     """Let a simulated operator move a simulated robot along the thesis' path; evaluate the errors.
 
     By default 54 runs: 10 targets at three places, three scales and three delays, each repeated.

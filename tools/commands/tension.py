@@ -16,13 +16,8 @@ from cdpr_profiles import Winch, load_winch
 from cdpr_profiles.tension_sensor import TensionSensors, load_load_cells
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.clock import Clock, PacedClock
-from cdpr_tools.commands.options import (
-    JsonOption,
-    OverwriteOption,
-    RecordedWinchOption,
-    SafetyIoOption,
-    YesOption,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
 from cdpr_tools.composition.session import confirm_motion, find_bus, open_winch
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
@@ -48,11 +43,10 @@ from cdpr_tools.tension.watch import by_prompt, on_board
 app = typer.Typer(name="tension", help="Read, tare and calibrate load cells.", no_args_is_help=True)
 
 _SensorsOption = Annotated[
-    str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
+    str, option("Tension sensors: a name or a file.", "--sensors", metavar="SENSORS")
 ]
 _PortOption = Annotated[
-    str,
-    typer.Option("--tension-port", help="Serial port of the RS-485 line, such as /dev/ttyUSB0."),
+    str, option("Serial port of the RS-485 line, such as /dev/ttyUSB0.", "--tension-port")
 ]
 _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
@@ -64,10 +58,8 @@ _MASS_PLANT = '[load]\nkind = "hung_mass"\n'
 def watch(
     sensors: _SensorsOption,
     port: _PortOption,
-    seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="Duration; until Ctrl-C by default.")
-    ] = None,
-    as_json: JsonOption = False,
+    seconds: Annotated[float | None, option("Duration; until Ctrl-C by default.", min=0.1)] = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the tensions live, and their mean and spread at the end; reads only."""
     out = Output(as_json)
@@ -88,11 +80,9 @@ def watch(
 def tare(
     sensors: _SensorsOption,
     port: _PortOption,
-    cable: Annotated[
-        list[str] | None, typer.Option(help="Only this cable; may be repeated.")
-    ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=60.0, help="Averaging time.")] = 2.0,
-    as_json: JsonOption = False,
+    cable: Annotated[list[str] | None, option("Only this cable; may be repeated.")] = None,
+    seconds: Annotated[float, option("Averaging time.", min=0.1, max=60.0)] = 2.0,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make the present readings zero; every cable must be slack.
 
@@ -152,51 +142,38 @@ def calibrate(
     winch: WinchOnBus,
     out: Output,
     masses: Annotated[
-        str | None, typer.Option(help="At least three masses to hang, in kg, such as 2,5,10.")
+        str | None, option("At least three masses to hang, in kg, such as 2,5,10.")
     ] = None,
     sensors: Annotated[
-        str | None, typer.Option(help="Load cells instead of masses: a name or a file.")
+        str | None, option("Load cells instead of masses: a name or a file.")
     ] = None,
     port: Annotated[
-        str | None,
-        typer.Option("--tension-port", help="Serial port of the load cells, such as /dev/ttyUSB0."),
+        str | None, option("Serial port of the load cells, such as /dev/ttyUSB0.", "--tension-port")
     ] = None,
-    cable: Annotated[
-        str | None, typer.Option(help="The load cell's cable; the first by default.")
-    ] = None,
+    cable: Annotated[str | None, option("The load cell's cable; the first by default.")] = None,
     out_dir: Annotated[
-        Path | None,
-        typer.Option("--out", help="Folder for raw data and result; default out/tension-WINCH."),
+        Path | None, option("Folder for raw data and result; default out/tension-WINCH.", "--out")
     ] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.OverwriteOption = False,
     speed_mm_s: Annotated[
         float | None,
-        typer.Option(
-            "--speed-mm-s", min=0.5, max=200.0, help="Cable speed: 40 with masses, 5 without."
-        ),
+        option("Cable speed: 40 with masses, 5 without.", "--speed-mm-s", min=0.5, max=200.0),
     ] = None,
     lead_mm: Annotated[
-        float,
-        typer.Option("--lead-mm", min=20.0, max=2000.0, help="Cable to wind in before measuring."),
+        float, option("Cable to wind in before measuring.", "--lead-mm", min=20.0, max=2000.0)
     ] = 160.0,
-    turns: Annotated[
-        int, typer.Option(min=1, max=20, help="Motor turns to measure in each direction.")
-    ] = 2,
-    gravity: Annotated[
-        float, typer.Option(min=9.7, max=9.9, help="Local gravity, m/s2.")
-    ] = _STANDARD_GRAVITY,
-    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest tension, N.")] = 10.0,
-    highest_N: Annotated[float, typer.Option("--highest-n", help="Highest tension, N.")] = 80.0,
+    turns: Annotated[int, option("Motor turns to measure in each direction.", min=1, max=20)] = 2,
+    gravity: Annotated[float, option("Local gravity, m/s2.", min=9.7, max=9.9)] = _STANDARD_GRAVITY,
+    lowest_N: Annotated[float, option("Lowest tension, N.", "--lowest-n")] = 10.0,
+    highest_N: Annotated[float, option("Highest tension, N.", "--highest-n")] = 80.0,
     travel_mm: Annotated[
-        float,
-        typer.Option("--travel-mm", min=1.0, help="With a fastened cable: most cable to wind in."),
+        float, option("With a fastened cable: most cable to wind in.", "--travel-mm", min=1.0)
     ] = 500.0,
     board: Annotated[
-        Path | None,
-        typer.Option(help="Physics board of a simulator, which then hangs the masses itself."),
+        Path | None, option("Physics board of a simulator, which then hangs the masses itself.")
     ] = None,
-    safety_io: SafetyIoOption = None,
-    yes: YesOption = False,
+    safety_io: options.SafetyIoOption = None,
+    yes: options.YesOption = False,
 ) -> None:
     """Identify a winch's tension-to-torque gain and friction, from masses or from a load cell."""
     profile = winch.profile
@@ -275,9 +252,9 @@ class _Run:
 
 @app.command()
 def fit(
-    folder: Annotated[Path, typer.Argument(help="The --out folder of a tension_calibration.")],
-    winch: RecordedWinchOption = None,
-    as_json: JsonOption = False,
+    folder: Annotated[Path, argument("The --out folder of a tension_calibration.")],
+    winch: options.RecordedWinchOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Identify again from the recordings of a tension calibration."""
     out = Output(as_json)

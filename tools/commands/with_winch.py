@@ -11,17 +11,8 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_profiles import Winch, load_winch
 from cdpr_rt.loop.operating import Tolerance
-from cdpr_tools.commands.options import (
-    BusOption,
-    JsonOption,
-    PlantOption,
-    SafetyIoOption,
-    SensorsOption,
-    SensorsPortOption,
-    WinchArgument,
-    YesOption,
-    shares,
-)
+from cdpr_tools.commands import options
+from cdpr_tools.commands.options import shares
 from cdpr_tools.composition.session import (
     Session,
     Watching,
@@ -71,7 +62,10 @@ class WinchOnBus:
 @shares
 @contextmanager
 def with_winch(
-    winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
+    winch: options.WinchArgument,
+    bus: options.BusOption,
+    plant: options.PlantOption = None,
+    as_json: options.JsonOption = False,
 ) -> Iterator[tuple[WinchOnBus, Output]]:
     """Pass the winch that these options name, and the output, to a command."""
     out = Output(as_json)
@@ -81,14 +75,14 @@ def with_winch(
 @shares
 @contextmanager
 def with_powered_winch(
-    winch: WinchArgument,
-    bus: BusOption,
-    plant: PlantOption = None,
-    safety_io: SafetyIoOption = None,
-    sensors: SensorsOption = None,
-    port: SensorsPortOption = None,
-    yes: YesOption = False,
-    as_json: JsonOption = False,
+    winch: options.WinchArgument,
+    bus: options.BusOption,
+    plant: options.PlantOption = None,
+    safety_io: options.SafetyIoOption = None,
+    sensors: options.SensorsOption = None,
+    port: options.SensorsPortOption = None,
+    yes: options.YesOption = False,
+    as_json: options.JsonOption = False,
 ) -> Iterator[tuple[WinchOnBus, Output]]:
     """Pass the winch that the command energises, and the output, to the command."""
     out, watching = Output(as_json), tension_watch(sensors, port)
