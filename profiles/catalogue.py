@@ -6,22 +6,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
+from cdpr_profiles import places
 from cdpr_profiles.bounded_input import is_file, path_of, read_toml, resolved
 from cdpr_profiles.cable import Cable, CableSeries
 from cdpr_profiles.drive import DriveProfile
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.motor import Motor, MotorRatings, MotorSeries
 from cdpr_profiles.motor_bounds import MOST_SPEED_RATIO
-from cdpr_profiles.places import (
-    KINDS,
-    SERIES,
-    SHIPPED,
-    ProfileKind,
-    find,
-    profile_files,
-    require,
-    unknown_profile,
-)
 from cdpr_profiles.platform import CLEARANCE_m, Platform
 from cdpr_profiles.rail import Cia402Rail, load_rail
 from cdpr_profiles.reader import read_toml_model
@@ -46,7 +37,7 @@ def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
 
     Raises ProfileError, also for a motor whose source has only its ratings.
     """
-    path = find("motors", name, beside)
+    path = places.find("motors", name, beside)
     if path is not None:
         return read_toml_model(path, Motor)
     for series_path, series in _motor_series().items():
@@ -60,7 +51,7 @@ def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
                 f"the data sheet has only the ratings of {name}, not its torque constant and "
                 "winding; write a motor file with these values",
             )
-    raise unknown_profile("motors", name, beside, _names("motors"))
+    raise places.unknown_profile("motors", name, beside, _names("motors"))
 
 
 def load_motor_ratings(name: str) -> MotorRatings:
@@ -68,12 +59,12 @@ def load_motor_ratings(name: str) -> MotorRatings:
     for series in _motor_series().values():
         if name in series.names():
             return series.names()[name]
-    raise unknown_profile("motors", name, more=_names("motors"))
+    raise places.unknown_profile("motors", name, more=_names("motors"))
 
 
 def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     """Return a drive by name or path; `eds` is an existing absolute path. Raises ProfileError."""
-    path = require("drives", name, beside)
+    path = places.require("drives", name, beside)
     drive = read_toml_model(path, DriveProfile)
     eds = path.parent / drive.eds
     if not is_file(eds):
@@ -85,12 +76,12 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
 
 def load_rail_drive(name: str | Path, rail: Cia402Rail) -> DriveProfile:
     """Return the drive named in a rail's file, searched beside it first; raises ProfileError."""
-    return load_drive(rail.drive, require("rails", name).parent)
+    return load_drive(rail.drive, places.require("rails", name).parent)
 
 
 def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
     """Return a cable by name or path; raises ProfileError."""
-    return read_toml_model(require("cables", name, beside), Cable)
+    return read_toml_model(places.require("cables", name, beside), Cable)
 
 
 def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
@@ -98,7 +89,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
 
     These are searched beside the winch's file first. Raises ProfileError.
     """
-    path = require("winches", name, beside)
+    path = places.require("winches", name, beside)
     file = read_toml_model(path, WinchFile)
     folder = path.parent
     if file.node_id == file.master_node_id:
@@ -121,10 +112,10 @@ def load_robot(name: str | Path) -> Robot:
     The winches are searched beside the robot's file first. If `name` is that of a winch, the
     robot has this winch as its only axis.
     """
-    path = find("robots", name)
+    path = places.find("robots", name)
     if path is None or "motor" in read_toml(path):
-        if find("winches", name) is None:
-            raise unknown_profile("robots", name, None, _names("winches"))
+        if places.find("winches", name) is None:
+            raise places.unknown_profile("robots", name, None, _names("winches"))
         return robot_of_winch(load_winch(name))
     file = read_toml_model(path, RobotFile)
     _raise_faults(path, list(file.faults()))
@@ -272,28 +263,30 @@ def _path_from(file: Path, text: str) -> Path:
 
 def load_winch_or_robot(name: str | Path) -> Winch | Robot:
     """Return the robot or the winch of this name or path; raises ProfileError."""
-    robot = find("robots", name, None)
+    robot = places.find("robots", name, None)
     if robot is None:
-        if find("winches", name, None) is None:
-            unknown = unknown_profile("winches", name, None, _names("robots"))
+        if places.find("winches", name, None) is None:
+            unknown = places.unknown_profile("winches", name, None, _names("robots"))
             raise ProfileError("winches and robots", "", unknown.problem)
         return load_winch(name)
-    if find("winches", name, None) == robot and not {"axes", "buses"} & set(read_toml(robot)):
+    if places.find("winches", name, None) == robot and not {"axes", "buses"} & set(
+        read_toml(robot)
+    ):
         return load_winch(name)
     return load_robot(name)
 
 
-def list_profiles() -> dict[ProfileKind, tuple[str, ...]]:
+def list_profiles() -> dict[places.ProfileKind, tuple[str, ...]]:
     """Return the names of all profiles by kind, including every motor of a series."""
-    return {kind: tuple(sorted(_names(kind))) for kind in KINDS}
+    return {kind: tuple(sorted(_names(kind))) for kind in places.KINDS}
 
 
-def load_profile(kind: ProfileKind, name: str) -> object:
+def load_profile(kind: places.ProfileKind, name: str) -> object:
     """Return a profile by its kind and name; the ratings for a motor without a size sheet.
 
     Raises ProfileError.
     """
-    if kind == "motors" and find(kind, name) is None:
+    if kind == "motors" and places.find(kind, name) is None:
         ratings = load_motor_ratings(name)
         return next(filter(None, (s.motor(name) for s in _motor_series().values())), ratings)
     return _LOADERS[kind](name)
@@ -306,21 +299,21 @@ def load_all() -> dict[str, dict[str, object]]:
     """
     _motor_series.cache_clear()
     everything: dict[str, dict[str, object]] = {
-        kind: {name: load_profile(kind, name) for name in _names(kind)} for kind in KINDS
+        kind: {name: load_profile(kind, name) for name in _names(kind)} for kind in places.KINDS
     }
-    for path in sorted((SHIPPED / "cables").glob("*" + SERIES)):
+    for path in sorted((places.SHIPPED / "cables").glob("*" + places.SERIES)):
         everything["cables"] |= {s.code: s for s in read_toml_model(path, CableSeries).sizes}
     return everything
 
 
 @lru_cache(maxsize=1)
 def _motor_series() -> dict[Path, MotorSeries]:
-    paths = sorted((SHIPPED / "motors").glob("*" + SERIES))
+    paths = sorted((places.SHIPPED / "motors").glob("*" + places.SERIES))
     return {path: read_toml_model(path, MotorSeries) for path in paths}
 
 
-def _names(kind: ProfileKind) -> set[str]:
-    names = {path.stem for path in profile_files(kind)}
+def _names(kind: places.ProfileKind) -> set[str]:
+    names = {path.stem for path in places.profile_files(kind)}
     if kind == "motors":
         for series in _motor_series().values():
             names |= set(series.names())
@@ -332,12 +325,12 @@ def _load_reference(file: Path, key: str, load: Callable[..., _T], *named: str |
     try:
         return load(*named)
     except ProfileError as error:
-        if error.file in KINDS:
+        if error.file in places.KINDS:
             raise ProfileError(file, key, error.problem) from None
         raise
 
 
-_LOADERS: dict[ProfileKind, Callable[[str], object]] = {
+_LOADERS: dict[places.ProfileKind, Callable[[str], object]] = {
     "motors": load_motor,
     "drives": load_drive,
     "cables": load_cable,

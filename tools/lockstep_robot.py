@@ -38,16 +38,10 @@ from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.refusal import CommandRefusal
 from cdpr_rt.robot import Error, InvalidArgument, NotRunning, Refused
+from cdpr_rt.service import stream_packet
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.rows import cycle_figures
 from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
-from cdpr_rt.service.stream_packet import (
-    StreamAnswer,
-    StreamSession,
-    StreamSetpoint,
-    parse,
-    seal,
-)
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells, RobotSimulator
@@ -143,7 +137,7 @@ class StreamInBusTime:
 class StreamSender:
     """The packets of one session, numbered and stamped."""
 
-    def __init__(self, session: StreamSession) -> None:
+    def __init__(self, session: stream_packet.StreamSession) -> None:
         self._session = session
         self._sequence = 0
 
@@ -159,16 +153,16 @@ class StreamSender:
         self._sequence += 1
         x, y, z = position_m
         w, i, j, k = quaternion
-        setpoint = StreamSetpoint(
+        setpoint = stream_packet.StreamSetpoint(
             self._session.number, self._sequence, round(sent_s * 1e9), (x, y, z), (w, i, j, k),
             scale, buttons,
         )  # fmt: skip
-        return seal(setpoint, self._session.key)
+        return stream_packet.seal(setpoint, self._session.key)
 
-    def answer_of(self, data: bytes) -> StreamAnswer:
+    def answer_of(self, data: bytes) -> stream_packet.StreamAnswer:
         """Return the robot's answer; raises PacketError for a packet of another session."""
-        packet = parse(data, self._session.key)
-        assert isinstance(packet, StreamAnswer)  # the manager sends no other kind
+        packet = stream_packet.parse(data, self._session.key)
+        assert isinstance(packet, stream_packet.StreamAnswer)  # the manager sends no other kind
         return packet
 
 

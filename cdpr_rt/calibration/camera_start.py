@@ -17,16 +17,9 @@ from cdpr_rt.calibration.camera_model import (
     corner_residuals,
 )
 from cdpr_rt.calibration.fit import Fit, fit
+from cdpr_rt.calibration.markers import marker_map
 from cdpr_rt.calibration.markers.geometry import angles, exponentials, logarithms, nearest_rotation
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map
-from cdpr_rt.calibration.markers.marker_map import (
-    MarkerMap,
-    SeenMarkers,
-    Sighting,
-    aligned,
-    consistent_places,
-    known_places,
-)
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CameraSetup, HandEye, Observations
 from cdpr_rt.errors import InvalidRequestError
@@ -136,7 +129,7 @@ def camera_start(
     geometry: CableGeometry,
     seen: Observations,
     setup: CameraSetup,
-    sightings: Sequence[Sighting],
+    sightings: Sequence[marker_map.Sighting],
 ) -> CameraStart:
     """Return the starting point of the fit; there is an image for each pose of `seen`.
 
@@ -144,7 +137,7 @@ def camera_start(
     BundleError if the images do not determine a map or the pose of the camera on the platform.
     """
     found = map_of_images(setup, sightings)
-    places = consistent_places(found.map, setup.sheets, setup.known_std_m)
+    places = marker_map.consistent_places(found.map, setup.sheets, setup.known_std_m)
     setup = setup.model_copy(update={"sheets": places.sheets})
     start = start_on_map(geometry, seen, setup, found)
     return replace(
@@ -154,7 +147,7 @@ def camera_start(
     )
 
 
-def map_of_images(setup: CameraSetup, sightings: Sequence[Sighting]) -> MapFit:
+def map_of_images(setup: CameraSetup, sightings: Sequence[marker_map.Sighting]) -> MapFit:
     """Return the map determined by images alone; raises InvalidRequestError and BundleError."""
     # the later fit uses known marker poses as measurements; here they would only set the frame
     return fit_map(sightings, setup.intrinsics, setup.sheets.model_copy(update={"known": ()}))
@@ -166,8 +159,8 @@ def start_on_map(
     """Return the starting point, given a map of the images; raises InvalidRequestError."""
     rough = fit(geometry, seen)
     map_ = found.map
-    if known := known_places(map_, setup.sheets)[0]:
-        map_ = aligned(map_, setup.sheets)[0]
+    if known := marker_map.known_places(map_, setup.sheets)[0]:
+        map_ = marker_map.aligned(map_, setup.sheets)[0]
     there = np.flatnonzero(map_.located)
     hand_eye, room = _places(rough.poses, map_, there, setup)
     known_room = bool(known) and _is_small(room, map_)
@@ -194,7 +187,7 @@ def start_on_map(
 
 
 def _places(
-    platform: FloatArray, map_: MarkerMap, there: IntArray, setup: CameraSetup
+    platform: FloatArray, map_: marker_map.MarkerMap, there: IntArray, setup: CameraSetup
 ) -> tuple[Rigid, Rigid]:
     """Return the camera's pose on the platform, and the map's pose in the room."""
     cameras = Rigid(map_.camera_rotation[there], map_.camera_position_m[there])
@@ -225,19 +218,19 @@ def _require_likely(
         )
 
 
-def _is_small(room: Rigid, map_: MarkerMap) -> bool:
+def _is_small(room: Rigid, map_: marker_map.MarkerMap) -> bool:
     """Return whether the map is nearly where the robot's file places it."""
     return _moved_m(room, map_) < _ROOM_m and bool(angles(room.rotation) < _ROOM_rad)
 
 
-def _moved_m(room: Rigid, map_: MarkerMap) -> float:
+def _moved_m(room: Rigid, map_: marker_map.MarkerMap) -> float:
     """Return how far the transform from the map's frame to the room's moves the camera."""
     at = map_.camera_position_m[map_.located]
     moved = at @ room.rotation.T + room.position_m - at
     return float(np.median(np.linalg.norm(moved, axis=1)))
 
 
-def _other_room(room: Rigid, map_: MarkerMap) -> str:
+def _other_room(room: Rigid, map_: marker_map.MarkerMap) -> str:
     return (
         f"the known markers put the platform {_moved_m(room, map_):.2f} m and "
         f"{math.degrees(angles(room.rotation)):.0f} deg from its place by the robot's "
@@ -249,7 +242,7 @@ def _other_room(room: Rigid, map_: MarkerMap) -> str:
 
 def _platform_poses(
     rough: FloatArray,
-    map_: MarkerMap,
+    map_: marker_map.MarkerMap,
     there: IntArray,
     hand_eye: Rigid,
     geometry: CableGeometry,
@@ -264,7 +257,7 @@ def _platform_poses(
 
 
 def _model(
-    setup: CameraSetup, found: MapFit, map_: MarkerMap, hand_eye: Rigid, room: Rigid
+    setup: CameraSetup, found: MapFit, map_: marker_map.MarkerMap, hand_eye: Rigid, room: Rigid
 ) -> CameraModel:
     lens = np.array(setup.intrinsics.parameters)
     given = setup.hand_eye
@@ -297,13 +290,13 @@ def _model(
 
 
 def _layout(
-    setup: CameraSetup, map_: MarkerMap, room: Rigid
+    setup: CameraSetup, map_: marker_map.MarkerMap, room: Rigid
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return positions and rotations of markers, and whether the pose of each is known."""
     count = len(map_.ids)
     position, rotation = np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
     known = np.zeros(count, bool)
-    numbers, places, turns = known_places(map_, setup.sheets)
+    numbers, places, turns = marker_map.known_places(map_, setup.sheets)
     known[numbers] = True
     position[numbers] = places @ room.rotation.T + room.position_m
     rotation[numbers] = room.rotation @ turns
@@ -320,7 +313,7 @@ _LEAST_MARKERS = 2
 
 
 def with_seen_poses(
-    made: Fit, sheets: MarkerSheets, seen: Observations, sightings: Sequence[Sighting]
+    made: Fit, sheets: MarkerSheets, seen: Observations, sightings: Sequence[marker_map.Sighting]
 ) -> Observations:
     """Return observations with poses measured by the camera, using the map of a fit.
 
@@ -360,8 +353,8 @@ def markers_of_map(
     ids: tuple[int, ...],
     placed: BoolArray,
     sheets: MarkerSheets,
-    sightings: Sequence[Sighting],
-) -> SeenMarkers:
+    sightings: Sequence[marker_map.Sighting],
+) -> marker_map.SeenMarkers:
     """Return the seen markers that have a pose in a map of `ids`, from images with at least two."""
     number = {marker: k for k, marker in enumerate(ids) if placed[k]}
     rows = [
@@ -372,7 +365,7 @@ def markers_of_map(
         for marker, corners in sorted(one.corners_px.items())
         if marker in number
     ]
-    return SeenMarkers(
+    return marker_map.SeenMarkers(
         tuple(one.name for one in sightings),
         ids,
         np.array([row[0] for row in rows], np.int64),

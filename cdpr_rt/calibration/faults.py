@@ -12,19 +12,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration import point_slips
 from cdpr_rt.calibration.camera_model import SIZE, CameraKnowledge, CameraModel
 from cdpr_rt.calibration.camera_start import CameraStart
 from cdpr_rt.calibration.fit import Fit, fit
 from cdpr_rt.calibration.markers.map_fit import MapFit, misfits, warnings
 from cdpr_rt.calibration.markers.marker_map import Sighting
 from cdpr_rt.calibration.parameters import DRUM, CableGeometry
-from cdpr_rt.calibration.point_slips import (
-    MARGIN,
-    SlipVerdict,
-    cost_of_readings,
-    row_slip,
-    slipped,
-)
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import length_std_m
 
@@ -132,15 +126,15 @@ def without_slipped_points(
     if not np.isfinite(seen.position_std_m).any():
         return seen, []
     blind, before = fit_without_faults(geometry, seen.unmeasured(), slack_N)
-    verdict = slipped(geometry, blind, seen)
+    verdict = point_slips.slipped(geometry, blind, seen)
     if not verdict.text and verdict.explained:
         return seen, []
     causes = [verdict.text] if verdict.text else []
     if not verdict.sure:
         readings, rival = _wrong_lengths(geometry, seen, slack_N, before)
-        if rival.explained and (not causes or rival.cost < verdict.cost - MARGIN):
+        if rival.explained and (not causes or rival.cost < verdict.cost - point_slips.MARGIN):
             return seen, []
-        if rival.explained and rival.cost < verdict.cost + MARGIN:
+        if rival.explained and rival.cost < verdict.cost + point_slips.MARGIN:
             causes += [one.text.partition(":")[0] for one in readings[:2]]
     if len(causes) == 1 and not verdict.undecided:
         text = f"{causes[0]}: correct the points, and fit again"
@@ -161,7 +155,7 @@ def without_slipped_points(
 
 def _wrong_lengths(
     geometry: CableGeometry, seen: Observations, slack_N: FloatArray, before: list[Fault]
-) -> tuple[list[Fault], SlipVerdict]:
+) -> tuple[list[Fault], point_slips.SlipVerdict]:
     """Return lengths that only the points contradict, and whether these explain the points."""
     joint, faults = fit_without_faults(geometry, seen, slack_N)
     known = {(one.kind, one.cable, one.pose) for one in before}
@@ -171,10 +165,10 @@ def _wrong_lengths(
         if one.kind in ("jump", "outlier") and (one.kind, one.cable, one.pose) not in known
     ]
     if not readings:
-        return [], SlipVerdict(explained=False)
+        return [], point_slips.SlipVerdict(explained=False)
     start = replace(joint.seen, start=joint.poses).unmeasured()
     others = fit(geometry, start, start=joint.geometry)
-    return readings, cost_of_readings(geometry, others, seen, len(readings))
+    return readings, point_slips.cost_of_readings(geometry, others, seen, len(readings))
 
 
 def without_points(seen: Observations, faults: Iterable[Fault]) -> Observations:
@@ -262,7 +256,7 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
         f"pose {seen.number(j)}: the measured point is {1e3 * size:.1f} mm from the position by "
         "all other readings"
     )
-    if slip := row_slip(measured, there, float(std_m.min())):
+    if slip := point_slips.row_slip(measured, there, float(std_m.min())):
         text += f"; it fits if {slip}"
     if fault.alike:
         cables = " or ".join(found.geometry.cable_name(cable) for cable in fault.alike)

@@ -12,19 +12,13 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.supervisor import Limits
+from cdpr_rt.model import rigid_body
 from cdpr_rt.model.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.model.interference import Interference, in_words
 from cdpr_rt.model.kinematics import CableKinematics
 from cdpr_rt.model.own_distribution import OwnDistribution, TensionDistribution
 from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.pose_tracking import poses_of_coordinates
-from cdpr_rt.model.rigid_body import (
-    G_m_s2,
-    directions_of,
-    home_rotation,
-    in_space,
-    inertia_kg_m2,
-)
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.model.tension_distribution import (
     TensionOutcome,
@@ -86,7 +80,7 @@ class PlatformModel:
         anchors, body = self.kinematics.geometry[ANCHOR:RADIUS].T, self.platform.body
         ends = np.array([anchors.min(axis=0), anchors.max(axis=0)])
         if body is not None:
-            ends = np.array([in_space(body.min_m), in_space(body.max_m)])
+            ends = np.array([rigid_body.in_space(body.min_m), rigid_body.in_space(body.max_m)])
         return np.array([ends[pick, range(3)] for pick in itertools.product((0, 1), repeat=3)])
 
     @cached_property
@@ -130,8 +124,8 @@ class PlatformModel:
     def weight(self) -> FloatArray:
         """Return the wrench of gravity on the platform at home's orientation, (d,)."""
         wrench, up = np.zeros(6), self.positions - 1
-        wrench[up] = -self.platform.mass_kg * G_m_s2
-        centre = in_space(self.platform.centre_of_mass_m)
+        wrench[up] = -self.platform.mass_kg * rigid_body.G_m_s2
+        centre = rigid_body.in_space(self.platform.centre_of_mass_m)
         wrench[3:] = np.cross(self.home_pose.Q @ centre, wrench[:3])
         return wrench[list(self.kinematics.directions)]
 
@@ -150,7 +144,7 @@ class PlatformModel:
         if platform.workspace_angle_rad > 0.0:
             share = wanted / platform.acceleration_m_s2
             Q = self.home_pose.Q
-            about_room = Q @ inertia_kg_m2(platform) @ Q.T
+            about_room = Q @ rigid_body.inertia_kg_m2(platform) @ Q.T
             turning = share * platform.angular_acceleration_rad_s2 * about_room
         directions = self.kinematics.directions
         weight, motions = wrenches_in_motion(
@@ -163,7 +157,7 @@ class PlatformModel:
             self.torque_limited_N,
             self.wrench_scale,
             self.reserve_N if reserve_N is None else reserve_N,
-            in_space(platform.centre_of_mass_m),
+            rigid_body.in_space(platform.centre_of_mass_m),
             motions,
         )
 
@@ -266,9 +260,9 @@ def cable_kinematics(platform: Platform, centre_m: FloatArray | float = 0.0) -> 
     return CableKinematics(
         np.array(platform.exit_points_m),
         np.array(platform.anchor_points_m) - centre_m,
-        directions_of(platform),
+        rigid_body.directions_of(platform),
         pulley_radius_m=np.array(platform.pulley_radius_m),
-        swivel_axes=np.array([in_space(axis) for axis in platform.pulley_axes]),
+        swivel_axes=np.array([rigid_body.in_space(axis) for axis in platform.pulley_axes]),
         weights_N_m=np.array(platform.cable_weights_N_m),
         home=_home_pose(platform),
     )
@@ -300,7 +294,7 @@ def _torque_limited_N(robot: Robot, limits: Limits, high_N: FloatArray) -> Float
     torque_Nm = np.asarray(limits.torque_Nm)
     per_rad = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
     rotor = np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in robot.axes])
-    k, d = len(platform.home_m), len(directions_of(platform))
+    k, d = len(platform.home_m), len(rigid_body.directions_of(platform))
     fastest = np.sqrt(k) * platform.acceleration_m_s2
     if d > k:
         fastest += _arm_m(platform) * np.sqrt(d - k) * platform.angular_acceleration_rad_s2
@@ -325,4 +319,4 @@ def _arm_m(platform: Platform) -> float:
 
 
 def _home_pose(platform: Platform) -> Pose:
-    return Pose(in_space(platform.home_m), home_rotation(platform))
+    return Pose(rigid_body.in_space(platform.home_m), rigid_body.home_rotation(platform))

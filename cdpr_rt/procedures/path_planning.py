@@ -17,17 +17,9 @@ from cdpr_rt.model.interference import in_words
 from cdpr_rt.model.path_wrenches import InertialWrenches, available_wrenches
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.rigid_body import G_m_s2
+from cdpr_rt.motion.path import time_scaling
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.nodes import MOST_NODES, EXACT_m, NODE_m, PathNodes, nodes_of
-from cdpr_rt.motion.path.time_scaling import (
-    MOST_SAMPLES,
-    PERIOD_S,
-    PathLimits,
-    TimedPath,
-    WrenchBounds,
-    speed_bounds,
-    time_path,
-)
 
 # Paths in wrong units, which are too large or too small by a factor of 25.4 or 1000 for the robot's
 # workspace. A mistake is reported only if the path fits after its correction.
@@ -85,7 +77,7 @@ def _text(size_m: FloatArray) -> str:
     return " x ".join(f"{1e3 * value:.4g}" for value in size_m) + " mm"
 
 
-LONGEST_s: Final = MOST_SAMPLES * PERIOD_S
+LONGEST_s: Final = time_scaling.MOST_SAMPLES * time_scaling.PERIOD_S
 """Longest duration of one plan; a longer path needs several."""
 MOST_WAITS: Final = 60
 _POSES_m: Final = 0.02
@@ -114,9 +106,9 @@ class PathPlan:
 
     path: PathDescription
     nodes: PathNodes
-    limits: PathLimits
+    limits: time_scaling.PathLimits
     obstacle: Obstacle | None
-    timed: TimedPath | None
+    timed: time_scaling.TimedPath | None
     """The path in time; None if the obstacle was found before timing."""
     constant_s: float
     """Duration at a constant speed and acceleration that all positions allow."""
@@ -141,7 +133,9 @@ class PathPlanner:
             raise PathError(robot.path, 0, NO_PLATFORM)
         self.model: PlatformModel = platform_model_of(robot)
         self.platform = platform
-        self.limits = PathLimits(self.model.speed, self.model.acceleration, self.model.jerk)
+        self.limits = time_scaling.PathLimits(
+            self.model.speed, self.model.acceleration, self.model.jerk
+        )
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         reference = np.zeros(self.model.size)
         reference[: self.model.positions] = np.clip(platform.home_m, low, high)
@@ -191,7 +185,7 @@ class PathPlanner:
         if self._least_s(nodes) > LONGEST_s:
             return None
         advance("time", 0.3)
-        timed = time_path(nodes, self.limits, wrenches)
+        timed = time_scaling.time_path(nodes, self.limits, wrenches)
         if timed.duration_s > LONGEST_s:
             return None
         if timed.departure_m > EXACT_m:
@@ -262,7 +256,7 @@ class PathPlanner:
 
     def _least_s(self, nodes: PathNodes) -> float:
         """Return a lower bound for the duration of a path."""
-        fastest = np.sqrt(speed_bounds(nodes, self.limits))
+        fastest = np.sqrt(time_scaling.speed_bounds(nodes, self.limits))
         step = np.diff(nodes.s)
         moves = step > 0.0
         least_s = nodes.dwell_s.sum()
@@ -276,11 +270,11 @@ class PathPlanner:
         platform = self.platform
         return np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
 
-    def _obstacle(self, nodes: PathNodes) -> tuple[WrenchBounds, Obstacle | None]:
+    def _obstacle(self, nodes: PathNodes) -> tuple[time_scaling.WrenchBounds, Obstacle | None]:
         """Return the bounds of wrenches along the path, and its first infeasible place."""
         outside = self._outside(nodes, *self._box())
         if outside is not None:
-            return WrenchBounds.none(0, self.model.size), outside
+            return time_scaling.WrenchBounds.none(0, self.model.size), outside
         wrenches, obstacle = self._wrenches(nodes)
         return wrenches, self._first(nodes, obstacle, self._contact(nodes))
 
@@ -325,7 +319,7 @@ class PathPlanner:
             f"{1e3 * high[j]:g} mm, the workspace"
         )
 
-    def _wrenches(self, nodes: PathNodes) -> tuple[WrenchBounds, Obstacle | None]:
+    def _wrenches(self, nodes: PathNodes) -> tuple[time_scaling.WrenchBounds, Obstacle | None]:
         """Return the bounds of wrenches along the path, or the first infeasible position."""
         model = self.model
         chosen = self.looked_at(nodes)
@@ -334,7 +328,7 @@ class PathPlanner:
         if not available.holds.all():
             i = int((~available.holds).argmax())
             why = self.infeasibility(positions[i])
-            return WrenchBounds.none(0, model.size), Obstacle(
+            return time_scaling.WrenchBounds.none(0, model.size), Obstacle(
                 int(nodes.line[chosen[i]]), positions[i].copy(), why
             )
         inertial = InertialWrenches(model, nodes.q)
@@ -351,9 +345,9 @@ class PathPlanner:
         number[kept] = np.arange(kept.size)
         row = number[nearest]
         if not kept.size:
-            return WrenchBounds.none(len(nodes.s), model.size), None
+            return time_scaling.WrenchBounds.none(len(nodes.s), model.size), None
         return (
-            WrenchBounds(
+            time_scaling.WrenchBounds(
                 row, available.normals[kept], available.lower[kept], available.upper[kept],
                 by_u, by_x,
             ),
@@ -385,7 +379,7 @@ class PathPlanner:
 
     def _most_wrench(self, nodes: PathNodes, by_u: FloatArray, by_x: FloatArray) -> FloatArray:
         """Return the largest value of each entry of the wrench within the limits, (N, d)."""
-        fastest = speed_bounds(nodes, self.limits)[:, None]
+        fastest = time_scaling.speed_bounds(nodes, self.limits)[:, None]
         fastest[nodes.runs.ravel()] = 0.0
         with np.errstate(divide="ignore"):
             bend = np.abs(nodes.second) * fastest
@@ -415,7 +409,7 @@ class PathPlanner:
         inner[nodes.runs.ravel()] = False
         if not inner.any():
             return float(nodes.dwell_s.sum())
-        v = float(np.sqrt(speed_bounds(nodes, self.limits)[inner].min()))
+        v = float(np.sqrt(time_scaling.speed_bounds(nodes, self.limits)[inner].min()))
         with np.errstate(divide="ignore"):
             a = float((self.limits.acceleration / np.abs(nodes.first[inner])).min())
         length = nodes.s[nodes.runs[:, 1]] - nodes.s[nodes.runs[:, 0]]
@@ -456,7 +450,7 @@ class PathTensions:
     """Whether tensions are within these bounds, (m,)."""
 
 
-def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
+def path_tensions(model: PlatformModel, timed: time_scaling.TimedPath) -> PathTensions:
     """Return the tensions along a plan, within the limits of the motors' torque."""
     step = -(-len(timed.samples) // _MOST)
     chosen = np.arange(0, len(timed.samples), step)

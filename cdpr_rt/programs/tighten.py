@@ -19,20 +19,10 @@ from cdpr_rt.model.last_lengths import (
 )
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.standing_tensions import OVERSHOOT, StandingTensions
+from cdpr_rt.programs import standing
 from cdpr_rt.programs.base import CommandArguments, ProgramError
 from cdpr_rt.programs.platform_program import Arrival, PlatformParts, PlatformProgram, distance_m
 from cdpr_rt.programs.slack import PULLED, TAKE_UP_SHARE, SlackTakeUp, Stillness, TAKE_UP_m_s
-from cdpr_rt.programs.standing import (
-    bad_source,
-    disagreement,
-    hangs,
-    rests_at_home,
-    source_refusal,
-    why_not_at_home,
-    why_not_to_hold,
-    why_not_to_pull,
-    would_move,
-)
 
 # A path of the platform on which every motor passes its index pulse.
 
@@ -470,7 +460,7 @@ class TightenProgram(PlatformProgram):
         if source not in SOURCES:
             allowed = ", ".join(SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
-        if (refusal := source_refusal(self._parts, source, arguments)) is not None:
+        if (refusal := standing.source_refusal(self._parts, source, arguments)) is not None:
             raise ProgramError(refusal)
         return str(source), source != "home" and self._is_to_hold(source, arguments)
 
@@ -483,14 +473,14 @@ class TightenProgram(PlatformProgram):
         parts, now = self._parts, self._checked
         # another program may have ended the hand-over in the meantime
         handing_over = self._hands_over and self._feedback.cycle - self._let_go_cycle <= 1
-        if parts.tight or handing_over or not hangs(parts):
+        if parts.tight or handing_over or not standing.hangs(parts):
             return False
         now.position_rad[:] = parts.estimator.position_rad
         length_m = self._source.before(source, now)
-        if length_m is None or rests_at_home(parts, length_m, now):
+        if length_m is None or standing.rests_at_home(parts, length_m, now):
             return False
-        if why := why_not_to_hold(parts, self._standing, length_m, now):
-            raise ProgramError(bad_source(arguments, why))
+        if why := standing.why_not_to_hold(parts, self._standing, length_m, now):
+            raise ProgramError(standing.bad_source(arguments, why))
         return True
 
     def _apply(self, checked: tuple[str, bool]) -> None:
@@ -580,7 +570,7 @@ class TightenProgram(PlatformProgram):
         # begin with these tensions, which press the platform down and may stretch cables more than
         # planned ones
         self._control.begin(feedback, tension_N)
-        self._fail_if(disagreement(self._parts, self._source.name))
+        self._fail_if(standing.disagreement(self._parts, self._source.name))
         if not self._failure:
             if self._source.name == "home":  # lengths of other sources may belong to another pose
                 self._control.pull_fit.begin_learning()
@@ -634,13 +624,13 @@ class TightenProgram(PlatformProgram):
         if length_m is None:
             return ""
         if self._source.name == "home":
-            return why_not_at_home(parts, length_m, self._winches.high_N, feedback)
-        why = why_not_to_pull(parts, length_m, self._winches.high_N, feedback)
+            return standing.why_not_at_home(parts, length_m, self._winches.high_N, feedback)
+        why = standing.why_not_to_pull(parts, length_m, self._winches.high_N, feedback)
         if why or self._stage > 0:
             return why
         tensions_N, stays = self._standing.at(parts.model.pose(parts.control.estimated))
         self._to_N[:], self._blend = tensions_N, 0.0
-        return "" if stays else would_move(parts)
+        return "" if stays else standing.would_move(parts)
 
     def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Begin to use the torques of the platform's control, starting from those of this cycle."""

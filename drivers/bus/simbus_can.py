@@ -9,17 +9,7 @@ from typing import Any
 
 import can
 
-from cdpr_drivers.bus import simbus
-from cdpr_drivers.bus.frames import (
-    EFF_FLAG,
-    EFF_MASK,
-    ERR_FLAG,
-    FRAME,
-    FRAME_BYTES,
-    RTR_FLAG,
-    SFF_MASK,
-    Bytes,
-)
+from cdpr_drivers.bus import frames, simbus
 from cdpr_drivers.errors import BusError
 
 _LISTED_AS = "@cdpr-rt/simbus/"
@@ -27,15 +17,15 @@ _LISTED_AS = "@cdpr-rt/simbus/"
 _PACKET_BYTES = 4096
 
 
-def message_of(packet: Bytes, channel: str | None = None) -> can.Message:
+def message_of(packet: frames.Bytes, channel: str | None = None) -> can.Message:
     """Return a packed frame as a python-can message, received now."""
-    can_id, length, data = FRAME.unpack(packet)
-    error = bool(can_id & ERR_FLAG)
-    extended = bool(can_id & EFF_FLAG) or error
-    remote = bool(can_id & RTR_FLAG) and not error
+    can_id, length, data = frames.FRAME.unpack(packet)
+    error = bool(can_id & frames.ERR_FLAG)
+    extended = bool(can_id & frames.EFF_FLAG) or error
+    remote = bool(can_id & frames.RTR_FLAG) and not error
     return can.Message(
         timestamp=time.time(),
-        arbitration_id=can_id & (EFF_MASK if extended else SFF_MASK),
+        arbitration_id=can_id & (frames.EFF_MASK if extended else frames.SFF_MASK),
         is_extended_id=extended,
         is_remote_frame=remote,
         is_error_frame=error,
@@ -49,18 +39,18 @@ def message_of(packet: Bytes, channel: str | None = None) -> can.Message:
 def packet_of(message: can.Message) -> bytes:
     """Return a python-can message (no CAN FD) as a packed frame."""
     can_id = message.arbitration_id
-    can_id |= EFF_FLAG if message.is_extended_id and not message.is_error_frame else 0
-    can_id |= RTR_FLAG if message.is_remote_frame else 0
-    can_id |= ERR_FLAG if message.is_error_frame else 0
-    return FRAME.pack(can_id, message.dlc, bytes(message.data[:8]))
+    can_id |= frames.EFF_FLAG if message.is_extended_id and not message.is_error_frame else 0
+    can_id |= frames.RTR_FLAG if message.is_remote_frame else 0
+    can_id |= frames.ERR_FLAG if message.is_error_frame else 0
+    return frames.FRAME.pack(can_id, message.dlc, bytes(message.data[:8]))
 
 
 def _pair_of(entry: can.typechecking.CanFilter) -> tuple[int, int]:
     """Return a python-can filter as a pair (identifier, mask), including the kind of identifier."""
     can_id, mask = entry["can_id"], entry["can_mask"]
     if "extended" in entry:
-        mask |= EFF_FLAG
-        can_id |= EFF_FLAG if entry["extended"] else 0
+        mask |= frames.EFF_FLAG
+        can_id |= frames.EFF_FLAG if entry["extended"] else 0
     return can_id, mask
 
 
@@ -112,7 +102,9 @@ class SimBus(can.BusABC):
         if not packet:
             raise self._gone("connection closed")
         # frames may have been in transit when the filters changed: python-can filters again
-        return message_of(packet, self.channel) if len(packet) == FRAME_BYTES else None, False
+        return message_of(packet, self.channel) if len(
+            packet
+        ) == frames.FRAME_BYTES else None, False
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send `msg`, waiting up to `timeout` seconds (None: one second) for room.

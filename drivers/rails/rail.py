@@ -8,18 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from cdpr_drivers import cia402
 from cdpr_drivers.canopen.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.cia402 import (
-    CONTROLWORD_TABLE,
-    FAULT_RESET,
-    HALT,
-    POWER_OFF,
-    Mode,
-    State,
-    fault_text,
-    state_of,
-)
 from cdpr_drivers.drive_units import acceleration_unit_rad_s2, torque_unit_Nm, velocity_unit_rad_s
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.modbus.channel import ModbusTcp
@@ -230,9 +221,9 @@ class Cia402RailAxis:
         tripped = self._safety.alarm() or self._safety.stop_reason() or self._network.alarm_text
         if tripped:
             raise RailError(f"{self._rail.name}: {tripped}")
-        state = state_of(self._statusword())
-        if state in (State.FAULT, State.FAULT_REACTION):
-            code = fault_text(self._network.read_int(self._node, 0x603F))
+        state = cia402.state_of(self._statusword())
+        if state in (cia402.State.FAULT, cia402.State.FAULT_REACTION):
+            code = cia402.fault_text(self._network.read_int(self._node, 0x603F))
             raise RailError(f"{self._rail.name}: node {self._node} is in fault: {code}")
 
     def position_m(self) -> float:
@@ -242,28 +233,31 @@ class Cia402RailAxis:
 
     def enable(self) -> None:
         """Switch on in profile position mode, with the present position as set-point."""
-        self._prepare(Mode.PROFILE_POSITION)
+        self._prepare(cia402.Mode.PROFILE_POSITION)
         speed, ramp = self._profile()
         self._write(0x6081, speed)
         self._write(0x6083, ramp)
         self._write(0x6084, ramp)
         self._write(0x607A, self._network.read_int(self._node, 0x6064))
-        self._reach_state(State.OPERATION_ENABLED)
+        self._reach_state(cia402.State.OPERATION_ENABLED)
 
     def disable(self) -> None:
         """Cut the power; a drive in fault has none."""
         self._pushing = False
-        if state_of(self._statusword()) not in (State.FAULT, State.FAULT_REACTION):
-            self._reach_state(State.SWITCH_ON_DISABLED)
+        if cia402.state_of(self._statusword()) not in (
+            cia402.State.FAULT,
+            cia402.State.FAULT_REACTION,
+        ):
+            self._reach_state(cia402.State.SWITCH_ON_DISABLED)
 
     def push(self, share: float) -> bool:
         """Push with a share of the rated torque in profile torque mode."""
-        if Mode.PROFILE_TORQUE not in self._drive.supported_modes:
+        if cia402.Mode.PROFILE_TORQUE not in self._drive.supported_modes:
             return False
         if share and not self._pushing:
-            self._prepare(Mode.PROFILE_TORQUE)
+            self._prepare(cia402.Mode.PROFILE_TORQUE)
             self._write(0x6071, 0)
-            self._reach_state(State.OPERATION_ENABLED)
+            self._reach_state(cia402.State.OPERATION_ENABLED)
             self._pushing = True
         limit = min(abs(share) * self._rated_Nm, self._map.torque_limit_Nm)
         self._write(0x6071, round(math.copysign(limit, share) / self._push_unit))
@@ -283,9 +277,9 @@ class Cia402RailAxis:
     def arrived(self) -> bool:
         """Return whether the target is reached; raises RailError if the drive lags or is off."""
         word = self._statusword()
-        if state_of(word) != State.OPERATION_ENABLED:
+        if cia402.state_of(word) != cia402.State.OPERATION_ENABLED:
             raise self._wrong(
-                f"left state operation enabled; it is in state {state_of(word).label}"
+                f"left state operation enabled; it is in state {cia402.state_of(word).label}"
             )
         if word & _FOLLOWING_ERROR:
             raise self._wrong("reports a following error")
@@ -293,10 +287,10 @@ class Cia402RailAxis:
 
     def halt(self) -> None:
         """Stop on the profile's ramp (605Dh) and wait for standstill or loss of power."""
-        self._write(0x6040, _ENABLED | HALT)
+        self._write(0x6040, _ENABLED | cia402.HALT)
         deadline = self._clock.now_s + _STOP_S
         while not (word := self._statusword()) & _TARGET_REACHED:
-            if state_of(word) != State.OPERATION_ENABLED:
+            if cia402.state_of(word) != cia402.State.OPERATION_ENABLED:
                 return
             if self._clock.now_s > deadline:
                 raise self._wrong("does not stop")
@@ -311,9 +305,9 @@ class Cia402RailAxis:
     def acknowledge_fault(self) -> None:
         """Reset the drive's fault by the rising edge of bit 7; this enables nothing."""
         self._write(0x6040, 0)
-        self._write(0x6040, FAULT_RESET)
+        self._write(0x6040, cia402.FAULT_RESET)
         self._write(0x6040, 0)
-        self._reach_state(State.SWITCH_ON_DISABLED)
+        self._reach_state(cia402.State.SWITCH_ON_DISABLED)
 
     def _profile(self) -> tuple[int, int]:
         """Return profile velocity and acceleration in the drive's units."""
@@ -322,10 +316,10 @@ class Cia402RailAxis:
         unit = acceleration_unit_rad_s2(self._drive, self._turn)
         return max(1, round(speed)), max(1, round(self._rail.acceleration_m_s2 * rad_per_m / unit))
 
-    def _prepare(self, mode: Mode) -> None:
+    def _prepare(self, mode: cia402.Mode) -> None:
         """Bring the drive without power into a mode that it confirms."""
-        if state_of(self._statusword()) not in POWER_OFF:
-            self._reach_state(State.SWITCH_ON_DISABLED)
+        if cia402.state_of(self._statusword()) not in cia402.POWER_OFF:
+            self._reach_state(cia402.State.SWITCH_ON_DISABLED)
         self._write(0x6060, mode)
         deadline = self._clock.now_s + self._drive.mode_display_timeout_s
         while (shown := self._network.read_int(self._node, 0x6061)) != mode:
@@ -333,16 +327,16 @@ class Cia402RailAxis:
                 raise self._wrong(f"shows mode {shown} (6061h) instead of {int(mode)}")
             self._clock.sleep(_LOOK_S)
 
-    def _reach_state(self, target: State) -> None:
+    def _reach_state(self, target: cia402.State) -> None:
         deadline = self._clock.now_s + 4.0 * self._drive.state_timeout_s
         while True:
-            state = state_of(self._statusword())
+            state = cia402.state_of(self._statusword())
             if state == target:
                 return
-            if self._clock.now_s > deadline or state == State.FAULT:
-                code = fault_text(self._network.read_int(self._node, 0x603F))
+            if self._clock.now_s > deadline or state == cia402.State.FAULT:
+                code = cia402.fault_text(self._network.read_int(self._node, 0x603F))
                 raise self._wrong(f"is in state {state.label} instead of {target.label} ({code})")
-            self._write(0x6040, int(CONTROLWORD_TABLE[target, state]))
+            self._write(0x6040, int(cia402.CONTROLWORD_TABLE[target, state]))
             self._clock.sleep(_LOOK_S)
 
     def _await_bit(self, bit: int, expected: bool, problem: str) -> None:

@@ -9,17 +9,9 @@ from cdpr_profiles.jit import bound
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
 from cdpr_sim_bus.canopen.od import Entry, ObjectDictionary, Value
 from cdpr_sim_bus.cia402.drive_quirks import DriveQuirks
-from cdpr_sim_bus.robot import servo
+from cdpr_sim_bus.robot import motor_state, servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot, MotorSample, RobotMember
 from cdpr_sim_bus.robot.motor import INDEX_FELL, INDEX_ROSE, restart_counter, run
-from cdpr_sim_bus.robot.motor_state import (
-    MotorRatings,
-    Transmission,
-    build_motor,
-    lengthen_cable,
-    mend_cable,
-    remove_cable,
-)
 from cdpr_sim_bus.robot.plant import Plant
 
 _WINDOW_OFF = 0xFFFFFFFF
@@ -43,8 +35,8 @@ class Axis:
         self,
         od: ObjectDictionary,
         plant: Plant,
-        ratings: MotorRatings,
-        transmission: Transmission | None = None,
+        ratings: motor_state.MotorRatings,
+        transmission: motor_state.Transmission | None = None,
         quirks: DriveQuirks | None = None,
         robot: RobotMember | None = None,
     ) -> None:
@@ -56,7 +48,7 @@ class Axis:
             plant.encoder.counts_per_turn / 60.0 if self.quirks.velocity_in_rpm else 1.0
         )
         """Counts/s of one velocity unit, counts/s² of one acceleration unit."""
-        self.motor = build_motor(plant, ratings, transmission)
+        self.motor = motor_state.build_motor(plant, ratings, transmission)
         self._robot = robot
         if robot is not None:
             self.motor = robot.adopt(self.motor, self._command)
@@ -196,7 +188,7 @@ class Axis:
         if self._robot is not None:
             self._robot.cut()
         else:
-            remove_cable(self.motor)
+            motor_state.remove_cable(self.motor)
         self.cable_cut = True
 
     def slip_cable(self, metres: float) -> None:
@@ -204,7 +196,7 @@ class Axis:
         if self._robot is not None:
             self._robot.slip(metres)
         else:
-            lengthen_cable(self.motor, metres)
+            motor_state.lengthen_cable(self.motor, metres)
         self.slipped_m += metres
 
     def mend_cable(self) -> None:
@@ -212,7 +204,7 @@ class Axis:
         if self._robot is not None:
             self._robot.mend(self.cable_cut, self.slipped_m)
         elif self.has_cable:
-            mend_cable(self.motor, self.plant.load, self.slipped_m)
+            motor_state.mend_cable(self.motor, self.plant.load, self.slipped_m)
         self.cable_cut, self.slipped_m = False, 0.0
 
     @property

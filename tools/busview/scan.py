@@ -11,19 +11,10 @@ from typing import Any
 
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.frames import FRAME
+from cdpr_drivers.canopen import sdo
 from cdpr_drivers.canopen.emergency import register_text
 from cdpr_drivers.canopen.error_control import NMT_STATES, STOPPED
 from cdpr_drivers.canopen.network import BusMember
-from cdpr_drivers.canopen.sdo import (
-    ABORT,
-    ANSWER,
-    REQUEST,
-    UPLOAD,
-    SdoClient,
-    abort_code,
-    expedited,
-    multiplexer,
-)
 from cdpr_drivers.cia402 import fault_text, mode_name, state_of, supported_modes
 from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
 from cdpr_profiles import DriveProfile, ProfileError, list_profiles, load_drive
@@ -49,8 +40,8 @@ ALWAYS: tuple[Object, ...] = (
     (0x1017, 0),
 )
 DRIVE: tuple[Object, ...] = ((0x6502, 0), (0x6041, 0), (0x6061, 0), (0x603F, 0))
-_NAMES = {multiplexer(*what): f"{what[0]:04X}h" for what in (FIRST, *ALWAYS, *DRIVE)}
-_NAMES |= {multiplexer(index, sub): f"{index:04X}h:{sub}" for index, sub in ALWAYS if sub}
+_NAMES = {sdo.multiplexer(*what): f"{what[0]:04X}h" for what in (FIRST, *ALWAYS, *DRIVE)}
+_NAMES |= {sdo.multiplexer(index, sub): f"{index:04X}h:{sub}" for index, sub in ALWAYS if sub}
 _SEGMENT = b""
 """Represents the next segment of a value in the counts of objects."""
 
@@ -93,11 +84,11 @@ class NodeInfo:
         what = data[1:4]
         if data[0] >> 5 == 0:
             what = _SEGMENT
-        elif abort_code(data) is not None:
+        elif sdo.abort_code(data) is not None:
             came = self.answered.get(what, [])
-            if any(one[0] >> 5 == UPLOAD and expedited(one) is None for one in came):
+            if any(one[0] >> 5 == sdo.UPLOAD and sdo.expedited(one) is None for one in came):
                 return  # it continues a value in segments, whose first answer has been counted
-        elif data[0] >> 5 != UPLOAD:
+        elif data[0] >> 5 != sdo.UPLOAD:
             return
         if self.asked[what]:
             self.answered[what].append(data)
@@ -128,7 +119,7 @@ _HEARTBEAT = 0x700
 _NODE, _FUNCTION = 0x07F, 0x780
 _RPDOS = (0x200, 0x300, 0x400, 0x500)
 _FILTERS = [(0x000, 0x7FF), (0x080, 0x7FF)]
-_FILTERS += [(base, _FUNCTION) for base in (*_RPDOS, ANSWER, REQUEST, _HEARTBEAT)]
+_FILTERS += [(base, _FUNCTION) for base in (*_RPDOS, sdo.ANSWER, sdo.REQUEST, _HEARTBEAT)]
 _LAST_STANDARD_ID = 0x7FF
 _NEXT_SEGMENT = 0x60
 _MOST_BYTES = 1024
@@ -154,7 +145,7 @@ class Scan(BusMember):
     def __init__(self, url: BusUrl, node_ids: Iterable[int]) -> None:
         self.traffic = Traffic()
         self.found = {node_id: NodeInfo(node_id) for node_id in node_ids}
-        self._clients: dict[int, SdoClient] = {}
+        self._clients: dict[int, sdo.SdoClient] = {}
         self._loss: BusError | None = None
         with raised_as(BadInputError, BusError):
             super().__init__(url, PacedClock(), _FILTERS)
@@ -184,7 +175,7 @@ class Scan(BusMember):
 
     def _read(self, found: NodeInfo) -> None:
         """Read the objects of one node; skip those that it rejects or does not return."""
-        client = SdoClient(partial(self._request, found), self.clock, _MOST_BYTES)
+        client = sdo.SdoClient(partial(self._request, found), self.clock, _MOST_BYTES)
         self._clients[found.node_id] = client
         self._read_object(client, found, FIRST)
         if found.answers:
@@ -192,7 +183,7 @@ class Scan(BusMember):
                 self._read_object(client, found, what)
 
     @staticmethod
-    def _read_object(client: SdoClient, found: NodeInfo, what: Object) -> None:
+    def _read_object(client: sdo.SdoClient, found: NodeInfo, what: Object) -> None:
         for _ in range(_ATTEMPTS):
             try:
                 found.objects[what] = client.upload(*what, _TIMEOUT_S)
@@ -204,11 +195,11 @@ class Scan(BusMember):
             return
 
     def _request(self, found: NodeInfo, data: bytes) -> None:
-        if data[0] == ABORT and not found.in_segments:
+        if data[0] == sdo.ABORT and not found.in_segments:
             return  # this abort could only end another master's transfer
         found.in_segments = data[0] & 0xEF == _NEXT_SEGMENT
-        found.asked[data[1:4] if data[0] == 0x40 else _SEGMENT] += data[0] != ABORT
-        self.send(REQUEST + found.node_id, data)
+        found.asked[data[1:4] if data[0] == 0x40 else _SEGMENT] += data[0] != sdo.ABORT
+        self.send(sdo.REQUEST + found.node_id, data)
 
     def take_frame(self, frame: memoryview) -> None:
         """Process one frame; ignore it if it is not an 11-bit data frame."""
@@ -220,11 +211,11 @@ class Scan(BusMember):
             found = self.found[node_id]
             found.heartbeats += 1
             found.nmt_state = data[0] & 0x7F
-        elif function == ANSWER and length == 8:
+        elif function == sdo.ANSWER and length == 8:
             if node_id in self._clients:
                 self.found[node_id].note_answer(data)
                 self._clients[node_id].on_answer(data)
-        elif function == REQUEST and node_id:
+        elif function == sdo.REQUEST and node_id:
             self.traffic.sdo_requests.add(node_id)
         elif identifier == 0x080:
             self.traffic.heard.add("SYNC")

@@ -21,17 +21,9 @@ from cdpr_rt.calibration.readings import CalibrationData
 from cdpr_rt.calibration.residuals import length_std_m
 from cdpr_rt.calibration.verdict import parameter_table, predicted_std
 from cdpr_tools.calibrate.truth_comparison import PoseErrors, TruthComparison
+from cdpr_tools.report import style
 from cdpr_tools.report.page import rendered
 from cdpr_tools.report.save import save
-from cdpr_tools.report.style import (
-    BACKWARD,
-    COLOURS,
-    FORWARD,
-    canvas,
-    data_uri,
-    label_view,
-    legend_above,
-)
 
 # The pictures of a calibration: changes found, residuals, and a map of the accuracy.
 
@@ -50,7 +42,7 @@ def found_figure(outcome: Outcome) -> Figure:
     names = [axis.name for axis in outcome.robot.axes]
     colour_of = mpl.colormaps["tab10" if len(names) <= _COLOURS else "tab20"]
     found, geometry = outcome.found, outcome.found.geometry
-    figure, (above, below) = canvas(2, height=2.7)
+    figure, (above, below) = style.canvas(2, height=2.7)
     n = geometry.n
     exits = [i for i, row in enumerate(geometry.rows) if row < 3]
     std = found.std[: n * len(geometry.rows)].reshape(n, -1)
@@ -59,7 +51,7 @@ def found_figure(outcome: Outcome) -> Figure:
         at = np.arange(n) + (place - 0.5 * (len(exits) - 1)) * width
         above.bar(
             at, 1e3 * geometry.cable[:, place], width, yerr=3e3 * std[:, column], capsize=2,
-            label="xyz"[place], color=(FORWARD, BACKWARD, COLOURS["none"])[place],
+            label="xyz"[place], color=(style.FORWARD, style.BACKWARD, style.COLOURS["none"])[place],
         )  # fmt: skip
     above.set(ylabel="exit point moved\n(mm, ± 3 sigma)", xlabel="cable")
     above.set_xticks(range(n), [f"{i + 1}\n{name}" for i, name in enumerate(names)])
@@ -70,11 +62,11 @@ def found_figure(outcome: Outcome) -> Figure:
         below.plot(poses[used], off_mm[used, i], "o", ms=2.5, color=colour_of(i), label=names[i])
     for fault in (one for one in outcome.faults if one.kind == "jump"):
         label = f"{names[fault.cable]} jumped by {1e3 * fault.size:+.1f} mm"
-        below.axvline(fault.pose + 0.5, color=BACKWARD, lw=0.9, label=label)
+        below.axvline(fault.pose + 0.5, color=style.BACKWARD, lw=0.9, label=label)
     below.axhline(0.0, color="#777777", lw=0.8)
     below.set(xlabel="pose", ylabel="length residual (mm)", xlim=(0.5, poses[-1] + 0.5))
     below.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-    legend_above(figure, above, below)
+    style.legend_above(figure, above, below)
     return figure
 
 
@@ -82,7 +74,7 @@ def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
     """Draw how accurate positions are across the workspace, from above and from a side."""
     platform = outcome.found.geometry.model.platform
     views = [(0, 1)] if len(platform.home_m) == 2 else [(0, 1), (0, 2)]
-    figure, axes = canvas(1, len(views), height=3.2)
+    figure, axes = style.canvas(1, len(views), height=3.2)
     shades = [_shade(ax, outcome, view) for ax, view in zip(axes, views, strict=True)]
     high = max(float(np.asarray(shade.get_array()).max()) for shade in shades)
     for ax, shade, view in zip(axes, shades, views, strict=True):
@@ -90,7 +82,7 @@ def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
         if comparison is not None:
             _held_out(ax, comparison.truth, comparison.places_m, view, labelled=ax is axes[-1])
         ax.margins(0.03)
-        label_view(ax, view)
+        style.label_view(ax, view)
     bar = figure.colorbar(shades[0], ax=axes, shrink=0.8)
     bar.set_label("3 sigma, predicted (mm)")
     return figure
@@ -127,8 +119,8 @@ def _held_out(
     size_m = float(f"{typical_m:.0e}")
     arrows = ax.quiver(
         places_m[:, i], places_m[:, j], errors.position_m[:, i], errors.position_m[:, j],
-        color=COLOURS["harmonic"], angles="xy", scale_units="xy", scale=size_m / _ARROW_m, zorder=3,
-        width=0.008,
+        color=style.COLOURS["harmonic"], angles="xy", scale_units="xy",
+        scale=size_m / _ARROW_m, zorder=3, width=0.008,
     )  # fmt: skip
     tips = places_m + errors.position_m * (_ARROW_m / size_m)
     ax.update_datalim(tips[:, view])  # matplotlib does not count arrow tips as data
@@ -141,21 +133,21 @@ def _held_out(
 
 def held_out_figure(comparison: TruthComparison) -> Figure:
     """Draw errors of held-out poses against the scanner, before and after the calibration."""
-    figure, axes = canvas(1, 2, height=2.6)
+    figure, axes = style.canvas(1, 2, height=2.6)
     after, before = comparison.scanner, comparison.scanner_before
     numbers = np.arange(len(after.position_m))
     for ax, key, scale, unit in (
         (axes[0], "position_m", 1e3, "mm"), (axes[1], "turn_rad", np.degrees(1.0), "deg"),
     ):  # fmt: skip
         for errors, label, colour, shift in (
-            (before, "by the robot's file", COLOURS["none"], -0.2),
-            (after, "calibrated", COLOURS["harmonic"], 0.2),
+            (before, "by the robot's file", style.COLOURS["none"], -0.2),
+            (after, "calibrated", style.COLOURS["harmonic"], 0.2),
         ):
             size = scale * np.linalg.norm(getattr(errors, key), axis=1)
             ax.bar(numbers + shift, size, 0.4, color=colour, label=label if ax is axes[0] else None)
         ax.set(xlabel="pose not used", ylabel=f"error by the scanner ({unit})")
         ax.set_xticks(numbers, [str(j + 1) for j in comparison.index], rotation=90)
-    legend_above(figure, axes[0])
+    style.legend_above(figure, axes[0])
     return figure
 
 
@@ -165,20 +157,20 @@ def markers_figure(found: Fit) -> Figure:
     assert camera is not None  # only drawn for a calibration with a camera
     placed, std_m = _known_to(found, camera)
     known_m = 3.0 * std_m
-    figure, (ax,) = canvas(height=4.6)
+    figure, (ax,) = style.canvas(height=4.6)
     where, _ = camera.camera_poses(poses)
-    ax.plot(where[:, 0], where[:, 1], "x", ms=4, color=COLOURS["none"], label="camera")
+    ax.plot(where[:, 0], where[:, 1], "x", ms=4, color=style.COLOURS["none"], label="camera")
     largest_m = float(known_m.max(initial=1e-9))
     label: str | None = f"marker; circle: 3 sigma, the largest {1e3 * largest_m:.2f} mm"
     for k, sigma_m in zip(placed.tolist(), known_m.tolist(), strict=True):
         x, y = camera.marker_position_m[k, :2]
         radius = _ARROW_m * sigma_m / largest_m
-        ax.add_patch(Circle((x, y), radius, fill=False, color=FORWARD))
-        ax.plot([x], [y], "s", ms=5, color=FORWARD, label=label)
+        ax.add_patch(Circle((x, y), radius, fill=False, color=style.FORWARD))
+        ax.plot([x], [y], "s", ms=5, color=style.FORWARD, label=label)
         label, marker = None, camera.ids[k]
         ax.annotate(str(marker), (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7)
     ax.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    legend_above(figure, ax)
+    style.legend_above(figure, ax)
     return figure
 
 
@@ -238,7 +230,7 @@ def write_report(
         size_std=float(found.camera_std[SIZE]) if found.camera else 0.0,
         cover=[] if outcome.cover is None else outcome.cover.lines(),
         image=_image(data, images) if found.camera else None,
-        pictures={name: data_uri(figure) for name, figure in pictures.items()},
+        pictures={name: style.data_uri(figure) for name, figure in pictures.items()},
         next_steps=next_steps,
     )
     save(path, text)

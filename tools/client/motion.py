@@ -11,18 +11,10 @@ from typing import Any
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.refusal import RefusalCode
 from cdpr_rt.robot import Robot, end_text, is_at_rest
+from cdpr_tools.client import status_text
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.client.status_text import (
-    DEAD,
-    ProgressNotes,
-    death_text,
-    next_steps,
-    platform_text,
-    put_back_text,
-    tightness_text,
-)
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import HELD, stop_on_signals
@@ -57,7 +49,7 @@ def carry_out(
 
     The motion also ends after `seconds`. Raises the command's errors if something else ends it.
     """
-    outcome, notes, deadline = Outcome(), ProgressNotes(out), time.monotonic() + seconds
+    outcome, notes, deadline = Outcome(), status_text.ProgressNotes(out), time.monotonic() + seconds
 
     def look(status: Mapping[str, Any]) -> None:
         if stop_requested() or time.monotonic() > deadline:
@@ -95,11 +87,11 @@ def run_to_end(
         outcome = carry_out(daemon, out, motion)
     except DaemonRefusalError as error:
         if error.refusal is not None and error.refusal.code is RefusalCode.NOT_TIGHT:
-            for step in next_steps(daemon.get("/status")):
+            for step in status_text.next_steps(daemon.get("/status")):
                 error.add_note(step.strip())
         raise
     except WorkFailedError as error:
-        if program == "tighten" and (put_back := put_back_text(daemon.get("/status"))):
+        if program == "tighten" and (put_back := status_text.put_back_text(daemon.get("/status"))):
             error.add_note(put_back)
         raise
     finish(daemon, out, outcome, where, **figures)
@@ -123,8 +115,8 @@ def finish(
     while not all(map(is_at_rest, status["axes"])) and time.monotonic() < deadline:
         time.sleep(LOOK_S)
         status = daemon.get("/status")
-    if status["state"] == DEAD:
-        raise WorkFailedError(death_text(status))
+    if status["state"] == status_text.DEAD:
+        raise WorkFailedError(status_text.death_text(status))
     if status["state"] == "active":
         out.say(*where_text(status, where if ended and not stopped else ""))
     if trouble := (ended or {}).get("trouble"):
@@ -150,8 +142,8 @@ def where_text(status: dict[str, Any], where: str = "") -> list[str]:
     """Return where the platform is, or each axis, and what holds it; or `where` if it is given."""
     if where:
         return [where]
-    tightness = tightness_text(status)
-    place = platform_text(status)
+    tightness = status_text.tightness_text(status)
+    place = status_text.platform_text(status)
     if tightness and place:
         return [f"{place}; {tightness}"]
     lines = []

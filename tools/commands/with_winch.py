@@ -13,16 +13,7 @@ from cdpr_profiles import Winch, load_winch
 from cdpr_rt.loop.operating import Tolerance
 from cdpr_tools.commands import options
 from cdpr_tools.commands.options import shares
-from cdpr_tools.composition.session import (
-    Session,
-    Watching,
-    confirm_motion,
-    no_watches,
-    open_bus,
-    open_network,
-    open_winch,
-    tension_watch,
-)
+from cdpr_tools.composition import session
 from cdpr_tools.output import Output
 
 
@@ -37,18 +28,18 @@ class WinchOnBus:
     out: Output
     yes: bool = False
     safety_io: str | None = None
-    watching: Watching = no_watches
+    watching: session.Watching = session.no_watches
 
     def network(self) -> AbstractContextManager[CanNetwork]:
         """Join the bus for acyclic work; see `open_network`."""
-        return open_network(self.profile, self.url, self.out, self.plant)
+        return session.open_network(self.profile, self.url, self.out, self.plant)
 
     def powered(
         self, what: str, tolerance: Tolerance | None = None
-    ) -> AbstractContextManager[Session]:
+    ) -> AbstractContextManager[session.Session]:
         """Ask the user for consent to `what`, then boot the drive; see `open_winch`."""
-        confirm_motion(self.url, self.yes, what)
-        return open_winch(
+        session.confirm_motion(self.url, self.yes, what)
+        return session.open_winch(
             self.profile,
             self.url,
             self.out,
@@ -69,7 +60,7 @@ def with_winch(
 ) -> Iterator[tuple[WinchOnBus, Output]]:
     """Pass the winch that these options name, and the output, to a command."""
     out = Output(as_json)
-    yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out), out
+    yield WinchOnBus(load_winch(winch), session.open_bus(bus), plant, out), out
 
 
 @shares
@@ -85,5 +76,8 @@ def with_powered_winch(
     as_json: options.JsonOption = False,
 ) -> Iterator[tuple[WinchOnBus, Output]]:
     """Pass the winch that the command energises, and the output, to the command."""
-    out, watching = Output(as_json), tension_watch(sensors, port)
-    yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out, yes, safety_io, watching), out
+    out, watching = Output(as_json), session.tension_watch(sensors, port)
+    yield (
+        WinchOnBus(load_winch(winch), session.open_bus(bus), plant, out, yes, safety_io, watching),
+        out,
+    )

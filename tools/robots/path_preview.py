@@ -16,28 +16,10 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.way_points import read_path, read_source
-from cdpr_rt.procedures.path_planning import (
-    Advance,
-    Obstacle,
-    PathPlan,
-    PathPlanner,
-    PathTensions,
-    path_tensions,
-    size_note,
-)
+from cdpr_rt.procedures import path_planning
 from cdpr_rt.programs.path_store import paths_folder, write_plan
 from cdpr_tools.output import TableText, time_text
-from cdpr_tools.report.style import (
-    BOUND,
-    LINES,
-    SERIES,
-    box_of_targets,
-    colour_bar,
-    decimated,
-    label_view,
-    legend_below,
-    save_figure,
-)
+from cdpr_tools.report import style
 from cdpr_tools.robots.path_options import PathOptions
 
 _ROUTE_POINTS: Final = 1500
@@ -47,34 +29,38 @@ _ROUTE_POINTS: Final = 1500
 class Preview:
     """A plan and the tensions that it needs."""
 
-    planner: PathPlanner
-    plan: PathPlan
-    tensions: PathTensions | None
-    obstacle: Obstacle | None
+    planner: path_planning.PathPlanner
+    plan: path_planning.PathPlan
+    tensions: path_planning.PathTensions | None
+    obstacle: path_planning.Obstacle | None
     note: str
 
 
-def preview(robot: Robot, file: Path, options: PathOptions, advance: Advance) -> Preview:
+def preview(
+    robot: Robot, file: Path, options: PathOptions, advance: path_planning.Advance
+) -> Preview:
     """Plan a file's path for a robot; raises PathError, ProfileError and BadInputError."""
     read_source(file)  # a missing file is reported before anything is compiled
     options.require_use(file)
-    planner = PathPlanner(robot)
+    planner = path_planning.PathPlanner(robot)
     advance("reading", 0.0)
     settings = options.settings(planner.model.positions)
     plan = planner.plan(read_path(file, planner.coordinates, settings), advance, options.line)
     tensions, obstacle = None, plan.obstacle
     if plan.timed is not None:
         advance("tensions along the path", 0.8)
-        tensions = path_tensions(planner.model, plan.timed)
+        tensions = path_planning.path_tensions(planner.model, plan.timed)
         if not tensions.carried.all():
             sample = int(tensions.sample[int((~tensions.carried).argmax())])
-            obstacle = Obstacle(
+            obstacle = path_planning.Obstacle(
                 int(plan.nodes.line[plan.timed.node[sample]]),
                 plan.timed.samples[sample, 0],
                 "the motion of the platform needs tensions outside their bounds",
             )
     box = planner.platform
-    note = size_note(plan.path, np.array(box.workspace_min_m), np.array(box.workspace_max_m))
+    note = path_planning.size_note(
+        plan.path, np.array(box.workspace_min_m), np.array(box.workspace_max_m)
+    )
     return Preview(planner, plan, tensions, obstacle, note)
 
 
@@ -238,13 +224,13 @@ def draw_path(shown: Preview, robot: Robot, file: Path) -> None:
     drawn[0].set_title(Path(shown.plan.path.source).name)
     named = drawn[:1]
     if timed:
-        colour_bar(figure, drawn[-1].collections[0], drawn, "speed (mm/s)")
+        style.colour_bar(figure, drawn[-1].collections[0], drawn, "speed (mm/s)")
         speed, tension = (figure.add_subplot(grid[row, :]) for row in (1, 2))
         _draw_speed(speed, shown)
         _draw_tensions(tension, shown, robot)
         named.append(tension)
-    legend_below(figure, *named, columns=6)
-    save_figure(figure, file)
+    style.legend_below(figure, *named, columns=6)
+    style.save_figure(figure, file)
 
 
 def _views(shown: Preview) -> list[_View]:
@@ -262,10 +248,10 @@ def _draw_view(ax: Axes, shown: Preview, view: _View) -> None:
     plan, platform = shown.plan, shown.planner.platform
     i, j = view.across, view.up
     low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
-    box_of_targets(ax, low, high, (i, j))
+    style.box_of_targets(ax, low, high, (i, j))
     if plan.timed is None:
         place = plan.nodes.q[:, [i, j]]
-        ax.plot(*place.T, color=SERIES[0], lw=1.0)
+        ax.plot(*place.T, color=style.SERIES[0], lw=1.0)
     else:
         step = -(-len(plan.timed.samples) // _MOST_POINTS)
         place = plan.timed.samples[::step, 0][:, [i, j]]
@@ -275,9 +261,9 @@ def _draw_view(ax: Axes, shown: Preview, view: _View) -> None:
         )
         parts.set_array(1e3 * speed[:-1])
         ax.add_collection(parts)
-    ax.plot(*plan.nodes.q[0, [i, j]], "o", ms=5, color=LINES, label="beginning")
+    ax.plot(*plan.nodes.q[0, [i, j]], "o", ms=5, color=style.LINES, label="beginning")
     if shown.obstacle is not None:
-        ax.plot(*shown.obstacle.position[[i, j]], "x", ms=11, mew=2.5, color=BOUND,
+        ax.plot(*shown.obstacle.position[[i, j]], "x", ms=11, mew=2.5, color=style.BOUND,
                 label=f"line {shown.obstacle.line}: cannot be there")  # fmt: skip
     every = place if view.enlarged else np.vstack([place, [low[[i, j]]], [high[[i, j]]]])
     span = np.ptp(every, axis=0)
@@ -285,7 +271,7 @@ def _draw_view(ax: Axes, shown: Preview, view: _View) -> None:
     margin = np.maximum(0.05 * span.max(), 0.5 * (_FLATTEST * span.max() - span))
     (left, bottom), (right, top) = every.min(axis=0) - margin, every.max(axis=0) + margin
     ax.set(xlim=(left, right), ylim=(bottom, top))
-    label_view(ax, (i, j))
+    style.label_view(ax, (i, j))
     ax.xaxis.set_major_locator(MaxNLocator(5))
     if view.enlarged:
         ax.set_title("enlarged")
@@ -296,7 +282,7 @@ def _draw_speed(ax: Axes, shown: Preview) -> None:
     assert timed is not None  # only drawn for a timed plan
     k = shown.planner.model.positions
     speed = np.linalg.norm(timed.samples[:, 1, :k], axis=1)
-    ax.plot(*decimated(_times(shown), 1e3 * speed), color=SERIES[0])
+    ax.plot(*style.decimated(_times(shown), 1e3 * speed), color=style.SERIES[0])
     ax.set(ylabel="speed (mm/s)", xlabel="time (s)", ylim=(0.0, None))
 
 
@@ -305,12 +291,14 @@ def _draw_tensions(ax: Axes, shown: Preview, robot: Robot) -> None:
     assert tensions is not None  # every timed plan has them
     t = _times(shown)[tensions.sample]
     for i, axis in enumerate(robot.axes):
-        colour = SERIES[i % len(SERIES)]
-        ax.plot(*decimated(t, tensions.tension_N[:, i]), color=colour, lw=1.2, label=axis.name)
+        colour = style.SERIES[i % len(style.SERIES)]
+        ax.plot(
+            *style.decimated(t, tensions.tension_N[:, i]), color=colour, lw=1.2, label=axis.name
+        )
     for bound in (tensions.low_N.max(), tensions.high_N.min()):
         # drawn behind the tensions, which may be at a bound all the time
-        ax.axhline(bound, color=BOUND, ls="--", lw=1.0, zorder=1)
-    ax.plot([], [], color=BOUND, ls="--", lw=1.0, label="planned within")
+        ax.axhline(bound, color=style.BOUND, ls="--", lw=1.0, zorder=1)
+    ax.plot([], [], color=style.BOUND, ls="--", lw=1.0, label="planned within")
     ax.set(ylabel="tension (N)", xlabel="time (s)")
 
 

@@ -15,14 +15,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.statics import Box, PlatformStatics, statics_of, view_of
-from cdpr_tools.report.style import (
-    LINES,
-    box_of_targets,
-    colour_bar,
-    label_view,
-    legend_below,
-    save_figure,
-)
+from cdpr_tools.report import style
 
 _PLATFORM = "#d1581a"
 _WIDE_in = 7.4
@@ -49,7 +42,7 @@ _View = tuple[int, int]
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
     """Write the picture of a robot as PNG."""
-    save_figure(figure_of(robot, platform), path, tight=True)
+    style.save_figure(figure_of(robot, platform), path, tight=True)
 
 
 def figure_of(robot: Robot, platform: Platform) -> Figure:
@@ -69,13 +62,13 @@ def figure_of(robot: Robot, platform: Platform) -> Figure:
     for ax, view in zip(all_axes, views, strict=True):
         _draw_machine(ax, robot, platform, view)
         i, j = view
-        label_view(ax, view)
+        style.label_view(ax, view)
         ax.set(xlim=(shown.low_m[i], shown.high_m[i]), ylim=(shown.low_m[j], shown.high_m[j]))
         ax.grid(visible=False)
         if not platform.is_planar:
             ax.set_title(_title(platform, view), fontsize="medium")
     figure.suptitle(robot.name)
-    legend_below(figure, all_axes[0], columns=3)
+    style.legend_below(figure, all_axes[0], columns=3)
     for _ in range(_LOOKS):
         if _has_room(figure, all_axes[-1]):
             break
@@ -146,29 +139,29 @@ def _draw_workspace(figure: Figure, all_axes: list[Axes], sections: list[_Sectio
         if section.moving_N.max() > 0.0:
             ax.contour(
                 xs, ys, section.moving_N, [0.0],
-                colors=LINES, linestyles="dotted", linewidths=1.0,
+                colors=style.LINES, linestyles="dotted", linewidths=1.0,
             )  # fmt: skip
     if filled is not None:
         label = "distance of all tensions\nfrom their limits, at rest (N)"
-        colour_bar(figure, filled, all_axes, label, 0.8 / len(sections))
+        style.colour_bar(figure, filled, all_axes, label, 0.8 / len(sections))
     if any(section.moving_N.max() > 0.0 for section in sections):
-        all_axes[0].plot([], [], ":", color=LINES, lw=1.0, label="targets are accepted")
+        all_axes[0].plot([], [], ":", color=style.LINES, lw=1.0, label="targets are accepted")
 
 
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:
     all_exits, home = np.array(platform.exit_points_m), np.array(platform.home_m)[list(view)]
     exits, anchors = all_exits[:, view], home + np.array(platform.anchor_points_m)[:, view]
     for a, b in zip(exits, anchors, strict=True):
-        ax.plot(*zip(a, b, strict=True), color=LINES, lw=1.2)
+        ax.plot(*zip(a, b, strict=True), color=style.LINES, lw=1.2)
     if view == (0, 1):  # in the other views names would cover each other
         _name_all(ax, [axis.name for axis in robot.axes], exits)
-    ax.plot([], [], color=LINES, lw=1.2, label="cables, at rest")
-    ax.plot(*exits.T, "s", ms=6, color=LINES, label="exit points")
+    ax.plot([], [], color=style.LINES, lw=1.2, label="cables, at rest")
+    ax.plot(*exits.T, "s", ms=6, color=style.LINES, label="exit points")
     outward = np.linspace(0.0, 2.0 * np.pi, _OUTLINE)
     furthest = (np.column_stack((np.cos(outward), np.sin(outward))) @ anchors.T).argmax(axis=1)
     ax.add_patch(Polygon(anchors[furthest], color=_PLATFORM, alpha=_SEEN_THROUGH, zorder=3))
     ax.plot(*home, "o", ms=3, color=_PLATFORM, label="platform, at rest", zorder=3)
-    box_of_targets(ax, platform.workspace_min_m, platform.workspace_max_m, view)
+    style.box_of_targets(ax, platform.workspace_min_m, platform.workspace_max_m, view)
 
 
 def _name_all(ax: Axes, names: list[str], exits_m: FloatArray) -> None:

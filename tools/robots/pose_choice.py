@@ -28,14 +28,7 @@ from cdpr_rt.model.reachable import Reach, Reached
 from cdpr_rt.motion.path.description import Coordinates, PathDescription
 from cdpr_rt.motion.path.way_points import MOST_BYTES, read_csv_points, read_toml_points
 from cdpr_tools.errors import BadInputError, os_error_as
-from cdpr_tools.report.style import (
-    SERIES,
-    box_of_targets,
-    colour_bar,
-    label_view,
-    legend_below,
-    save_figure,
-)
+from cdpr_tools.report import style
 
 AMONG = 20
 """Number of random poses for each chosen pose."""
@@ -160,10 +153,10 @@ def draw_poses(title: str, reach: Reach, chosen: Chosen, path: Path) -> None:
         _draw_view(ax, reach, chosen, angle if turned else None, view)
     if turned:
         shades = all_axes[-1].collections[-1]
-        colour_bar(figure, shades, all_axes, "turned from home's orientation (deg)")
+        style.colour_bar(figure, shades, all_axes, "turned from home's orientation (deg)")
     figure.suptitle(title)
-    legend_below(figure, all_axes[0], columns=4)
-    save_figure(figure, path)
+    style.legend_below(figure, all_axes[0], columns=4)
+    style.save_figure(figure, path)
 
 
 def _draw_view(
@@ -173,7 +166,7 @@ def _draw_view(
     platform, start = reach.model.platform, reach.start
     for position in chosen.positions:
         ax.plot([start[i], position[i]], [start[j], position[j]], "-", color=_WAY, lw=0.4, zorder=1)
-    box_of_targets(ax, platform.workspace_min_m, platform.workspace_max_m, view)
+    style.box_of_targets(ax, platform.workspace_min_m, platform.workspace_max_m, view)
     ax.plot(start[i], start[j], "s", color=_START, ms=7, zorder=4, label="start")
     for box in platform.obstacles:
         size = np.subtract(box.max_m, box.min_m)
@@ -181,9 +174,9 @@ def _draw_view(
         ax.add_patch(Rectangle(corner, float(size[i]), float(size[j]), fc=_OBSTACLE, ec=_WAY))
     x, y = chosen.positions[:, i], chosen.positions[:, j]
     if angle_deg is None:
-        ax.scatter(x, y, s=16, color=SERIES[0], zorder=3, label="pose")
+        ax.scatter(x, y, s=16, color=style.SERIES[0], zorder=3, label="pose")
     else:
         shown = Normalize(0.0, max(float(angle_deg.max()), math.degrees(1e-3)))
         ax.scatter(x, y, s=16, c=angle_deg, cmap="viridis", norm=shown, zorder=3, label="pose")
-    label_view(ax, view)
+    style.label_view(ax, view)
     ax.xaxis.set_major_locator(MaxNLocator(6))

@@ -27,14 +27,7 @@ from cdpr_rt.motion.pose_stream import CLUTCH, confirmation
 from cdpr_rt.motion.trajectory import approach
 from cdpr_rt.service.stream_packet import Standing
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.teleop.experiment_operator import (
-    HandModel,
-    OperatorModel,
-    OperatorParameters,
-    PositionFilter,
-    Station,
-    VisionModel,
-)
+from cdpr_tools.teleop import experiment_operator
 from cdpr_tools.trials.directions import Directions, platform_of
 from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun, trial_run
@@ -261,8 +254,8 @@ def run_trial(
     plant: RobotPlant | PerfectRobot,
     condition: Condition,
     targets_m: FloatArray,
-    parameters: OperatorParameters,
-    station: Station,
+    parameters: experiment_operator.OperatorParameters,
+    station: experiment_operator.Station,
     seed: int,
 ) -> tuple[NDArray[np.void], list[dict[str, Any]]]:
     """Let an operator lead `plant`, which stands at the path's start, along `targets_m` (k, 2).
@@ -274,12 +267,12 @@ def run_trial(
     """
     for_hand, for_eyes = condition.random(seed)
     there_s = SHARE_THERE * condition.round_trip_s
-    hand = HandModel(parameters, PACKET_S, for_hand)
-    vision = VisionModel(parameters, condition.round_trip_s - there_s, for_eyes)
-    operator = OperatorModel(
+    hand = experiment_operator.HandModel(parameters, PACKET_S, for_hand)
+    vision = experiment_operator.VisionModel(parameters, condition.round_trip_s - there_s, for_eyes)
+    operator = experiment_operator.OperatorModel(
         parameters, targets_m, condition.scale, condition.round_trip_s, station.clutch, hand, vision
     )
-    steady = PositionFilter(PACKET_S) if station.steady else None
+    steady = experiment_operator.PositionFilter(PACKET_S) if station.steady else None
     link = _Link(plant, there_s, condition.scale)
     begin_s, ticks = plant.now_s, []
     time_s, busy = 0.0, True
@@ -321,8 +314,8 @@ class ExperimentSettings:
     commissioned: str | None
     compensated: bool
     seed: int
-    operator: OperatorParameters
-    station: Station
+    operator: experiment_operator.OperatorParameters
+    station: experiment_operator.Station
     places: tuple[str, ...]
     scales: tuple[float, ...]
     round_trips_s: tuple[float, ...]
@@ -434,8 +427,8 @@ def points_of_perfect_robot(
     platform: Platform,
     centre_m: FloatArray,
     condition: Condition,
-    operator: OperatorParameters,
-    station: Station,
+    operator: experiment_operator.OperatorParameters,
+    station: experiment_operator.Station,
     seed: int,
 ) -> Points:
     """Return the points of the same operator, hand and vision with a perfect robot."""
