@@ -12,6 +12,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.camera_geometry import exponentials, logarithms
 from cdpr_rt.calibration.camera_model import UNKNOWN_HAND_EYE_STD, CameraKnowledge, CameraModel
 from cdpr_rt.calibration.camera_start import camera_start
 from cdpr_rt.calibration.faults import (
@@ -27,9 +28,8 @@ from cdpr_rt.calibration.faults import (
     without_slipped_points,
 )
 from cdpr_rt.calibration.fit import Fit, fit, fit_with_noise_seen, locate
-from cdpr_rt.calibration.markers.geometry import exponentials, logarithms
-from cdpr_rt.calibration.markers.map_fit import MapFit
-from cdpr_rt.calibration.markers.marker_map import best_fit, coverage, laid_out
+from cdpr_rt.calibration.marker_map import best_fit, coverage, laid_out
+from cdpr_rt.calibration.marker_map_fit import MapFit
 from cdpr_rt.calibration.noise import noise_seen
 from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
 from cdpr_rt.calibration.parameters import DRUM, EXIT, CableGeometry

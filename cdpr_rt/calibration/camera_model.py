@@ -14,9 +14,9 @@ from typing import Final, Self
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
-from cdpr_rt.calibration.markers.bundle import LENS_PARAMETERS, CornerTerms, Views, cauchy_cost
-from cdpr_rt.calibration.markers.geometry import cross_matrices, exponentials, logarithms
-from cdpr_rt.calibration.markers.marker_map import SeenMarkers
+from cdpr_rt.calibration.camera_geometry import cross_matrices, exponentials, logarithms
+from cdpr_rt.calibration.marker_bundle import LENS_PARAMETERS, CornerTerms, Views, cauchy_cost
+from cdpr_rt.calibration.marker_map import SeenMarkers
 
 SIZE, LENS = 6, 7
 """Indices of the relative size of the sheets, and of the lens, among the parameters."""

@@ -10,6 +10,8 @@ import numpy as np
 
 from cdpr_profiles.camera import MarkerSheets, rotation_vector_rad
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration import marker_map
+from cdpr_rt.calibration.camera_geometry import angles, exponentials, logarithms, nearest_rotation
 from cdpr_rt.calibration.camera_model import (
     UNKNOWN_HAND_EYE_STD,
     CameraKnowledge,
@@ -17,9 +19,7 @@ from cdpr_rt.calibration.camera_model import (
     corner_residuals,
 )
 from cdpr_rt.calibration.fit import Fit, fit
-from cdpr_rt.calibration.markers import marker_map
-from cdpr_rt.calibration.markers.geometry import angles, exponentials, logarithms, nearest_rotation
-from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map
+from cdpr_rt.calibration.marker_map_fit import MapFit, fit_map
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CameraSetup, HandEye, Observations
 from cdpr_rt.errors import InvalidRequestError

@@ -16,8 +16,8 @@ from cdpr_rt.calibration import point_slips
 from cdpr_rt.calibration.camera_model import SIZE, CameraKnowledge, CameraModel
 from cdpr_rt.calibration.camera_start import CameraStart
 from cdpr_rt.calibration.fit import Fit, fit
-from cdpr_rt.calibration.markers.map_fit import MapFit, misfits, warnings
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
+from cdpr_rt.calibration.marker_map_fit import MapFit, misfits, warnings
 from cdpr_rt.calibration.parameters import DRUM, CableGeometry
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import length_std_m

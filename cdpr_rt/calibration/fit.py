@@ -16,7 +16,7 @@ from cdpr_rt.calibration.camera_model import (
     corner_residuals,
     corner_terms,
 )
-from cdpr_rt.calibration.markers.bundle import (
+from cdpr_rt.calibration.marker_bundle import (
     NORMAL_MEDIAN,
     PoseBlocks,
     cauchy_weights,

@@ -17,7 +17,7 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.faults import UNDECIDED, Fault
 from cdpr_rt.calibration.fit import Fit
-from cdpr_rt.calibration.markers.marker_map import Coverage, listed
+from cdpr_rt.calibration.marker_map import Coverage, listed
 from cdpr_rt.calibration.noise import NoiseSeen
 from cdpr_rt.calibration.parameters import DRUM
 from cdpr_rt.calibration.verdict import (

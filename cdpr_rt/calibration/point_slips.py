@@ -27,7 +27,7 @@ from scipy.stats import chi2
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.fit import Fit, JUMP_STD_m, locate
-from cdpr_rt.calibration.markers.marker_map import best_fit
+from cdpr_rt.calibration.marker_map import best_fit
 from cdpr_rt.calibration.parameters import DRUM, CableGeometry
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import linearise

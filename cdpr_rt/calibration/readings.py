@@ -21,7 +21,7 @@ from cdpr_profiles.errors import ProfileError, value_text
 from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
-from cdpr_rt.calibration.markers.marker_map import SeenMarkers, Sighting
+from cdpr_rt.calibration.marker_map import SeenMarkers, Sighting
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.robot_arrays import limits_of

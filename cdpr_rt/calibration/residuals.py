@@ -37,7 +37,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.geometry import cross_matrices
+from cdpr_rt.calibration.camera_geometry import cross_matrices
 from cdpr_rt.calibration.parameters import (
     ANCHORS,
     CABLE_ROWS,

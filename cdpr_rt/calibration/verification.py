@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.camera_geometry import logarithms
 from cdpr_rt.calibration.camera_model import CameraModel
 from cdpr_rt.calibration.camera_start import (
     locate_by_camera,
@@ -19,8 +20,7 @@ from cdpr_rt.calibration.camera_start import (
 )
 from cdpr_rt.calibration.faults import fit_without_faults, free_wrong_values, without_slack
 from cdpr_rt.calibration.fit import Fit, locate, weighed_fit
-from cdpr_rt.calibration.markers.geometry import logarithms
-from cdpr_rt.calibration.markers.map_fit import MapFit
+from cdpr_rt.calibration.marker_map_fit import MapFit
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CameraSetup, Images, Observations
 from cdpr_rt.calibration.residuals import length_std_m

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import ImageReading, PoseReading
 from cdpr_rt.errors import TripError
 

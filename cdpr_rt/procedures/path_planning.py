@@ -17,9 +17,9 @@ from cdpr_rt.model.interference import in_words
 from cdpr_rt.model.path_wrenches import InertialWrenches, available_wrenches
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.rigid_body import G_m_s2
-from cdpr_rt.motion.path import time_scaling
-from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
-from cdpr_rt.motion.path.nodes import MOST_NODES, EXACT_m, NODE_m, PathNodes, nodes_of
+from cdpr_rt.motion import time_scaling
+from cdpr_rt.motion.path_description import Coordinates, PathDescription, PathError
+from cdpr_rt.motion.path_nodes import MOST_NODES, EXACT_m, NODE_m, PathNodes, nodes_of
 
 # Paths in wrong units, which are too large or too small by a factor of 25.4 or 1000 for the robot's
 # workspace. A mistake is reported only if the path fits after its correction.

@@ -25,7 +25,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import PATH
 from cdpr_rt.jit import jit
 from cdpr_rt.model.platform_model import PlatformModel
-from cdpr_rt.motion.path.time_scaling import PERIOD_S, TimedPath, quintic
+from cdpr_rt.motion.time_scaling import PERIOD_S, TimedPath, quintic
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.state_file import FILE_MODE, make_private_folder, state_path
 

@@ -29,7 +29,7 @@ from safety_rig import (
 )
 
 from cdpr_drivers.modbus.safety_io import SafetyIoError
-from cdpr_drivers.rails.rail import Cia402RailAxis, ModbusRailAxis, RailError
+from cdpr_drivers.robot.rail import Cia402RailAxis, ModbusRailAxis, RailError
 from cdpr_profiles.rail import load_rail
 from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.physics_board import PhysicsBoard, SafetyIoFault

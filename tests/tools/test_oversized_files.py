@@ -26,10 +26,10 @@ from pathlib import Path
 import numpy as np
 
 def path():
-    from cdpr_rt.motion.path.description import Coordinates
-    from cdpr_rt.motion.path.gcode import GcodeSettings
-    from cdpr_rt.motion.path.nodes import nodes_of
-    from cdpr_rt.motion.path.way_points import read_path
+    from cdpr_rt.motion.path_description import Coordinates
+    from cdpr_rt.motion.gcode import GcodeSettings
+    from cdpr_rt.motion.path_nodes import nodes_of
+    from cdpr_rt.motion.way_points import read_path
 
     named = Coordinates(("x", "y", "z"), np.zeros(3))
     settings = GcodeSettings(np.zeros(3))

@@ -48,7 +48,7 @@ from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.commission.page import bus_facts
 from cdpr_tools.errors import CommandError
 from cdpr_tools.recordings.stored_settings import load_settings
-from cdpr_tools.report.page import number
+from cdpr_tools.rendering import number
 from cdpr_tools.teleop.script import read_script
 from cdpr_tools.trials.trial import TrialSettings
 from tests.profiles.test_robot_limits import calibration

@@ -75,7 +75,7 @@ def measure(rate_Hz: float, seconds: float, picture: Path, out: Output) -> Figur
 def _draw(late: Lateness, rate_Hz: float, path: Path) -> None:
     """Write the histograms as a picture; raises BadInputError if it cannot be written."""
     # imported here: the probe, which locks its memory, must not load it
-    from cdpr_tools.report.style import canvas, legend_above, save_figure  # noqa: PLC0415
+    from cdpr_tools.style import canvas, legend_above, save_figure  # noqa: PLC0415
 
     figure, axes = canvas(1, len(_LOADS), height=3.2, sharey=True)
     worst_us = 1e-3 * max(float(times.max()) for of in late.values() for times in of.values())

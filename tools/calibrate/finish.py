@@ -32,7 +32,7 @@ from cdpr_rt.model.calibration_state import (
 from cdpr_tools.calibrate.run import COUNTED, points_of
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
-from cdpr_tools.report.save import require_own
+from cdpr_tools.saving import require_own
 
 if TYPE_CHECKING:
     from cdpr_tools.calibrate.truth_comparison import TruthComparison
@@ -241,7 +241,7 @@ def _reported(
 ) -> dict[str, str]:
     """Write picture and report; return their paths for JSON. Raises WorkFailedError."""
     from cdpr_tools.calibrate.page import found_figure, write_report  # noqa: PLC0415  # slow to load
-    from cdpr_tools.report.style import save_figure  # noqa: PLC0415
+    from cdpr_tools.style import save_figure  # noqa: PLC0415
 
     report, path = folder / _REPORT, folder / _PICTURE
     advice = dict.fromkeys(one.advice for one in outcome.open_directions)

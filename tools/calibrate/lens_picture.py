@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cdpr_rt.calibration.markers.detection import IntrinsicsFit
-from cdpr_tools.report.style import SERIES, save_figure
+from cdpr_rt.calibration.marker_detection import IntrinsicsFit
+from cdpr_tools.style import SERIES, save_figure
 
 _SHOWN, _COLUMNS = 6, 3
 _LARGER = 200.0

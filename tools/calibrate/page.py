@@ -20,10 +20,10 @@ from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings import CalibrationData
 from cdpr_rt.calibration.residuals import length_std_m
 from cdpr_rt.calibration.verdict import parameter_table, predicted_std
+from cdpr_tools import style
 from cdpr_tools.calibrate.truth_comparison import PoseErrors, TruthComparison
-from cdpr_tools.report import style
-from cdpr_tools.report.page import rendered
-from cdpr_tools.report.save import save
+from cdpr_tools.rendering import rendered
+from cdpr_tools.saving import save
 
 # The pictures of a calibration: changes found, residuals, and a map of the accuracy.
 

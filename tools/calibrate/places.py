@@ -16,7 +16,7 @@ from cdpr_rt.calibration.verification import LEAST_POSES
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.model.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.model.reachable import CONTACT, SHARE, WHOLE, Reach
-from cdpr_rt.motion.path.description import PathError
+from cdpr_rt.motion.path_description import PathError
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.robots.pose_choice import KINDS, Choose, choose, read_poses
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image, open_camera
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets, MarkerSize
-from cdpr_rt.calibration.markers.detection import Board, MarkerDetector, fit_intrinsics
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_detection import Board, MarkerDetector, fit_intrinsics
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CameraSetup
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.procedures.measure_poses import NotThePoseError

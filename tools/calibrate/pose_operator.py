@@ -12,7 +12,7 @@ import numpy as np
 from cdpr_profiles import Robot as Profile
 from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.core.states import EMERGENCY_STOP
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.measure_poses import (

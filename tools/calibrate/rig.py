@@ -18,7 +18,7 @@ from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.geometry_calibration import write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.procedures.measure_poses import (
     Readings,

@@ -17,7 +17,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.errors import FileMissingError, ProfileError, brief
 from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
 from cdpr_profiles.reader import Profile, read_json_model
-from cdpr_rt.calibration.markers.marker_map import coverage, listed
+from cdpr_rt.calibration.marker_map import coverage, listed
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings import (
     CalibrationData,

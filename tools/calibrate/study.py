@@ -30,7 +30,7 @@ from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import TableText
 from cdpr_tools.processes import cores, runner
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
+from cdpr_tools.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
 
 COUNTS: Final = (6, 10, 20, 50, 100, 150, 200, 300, 400)
 SHARES: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)

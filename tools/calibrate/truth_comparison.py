@@ -13,9 +13,9 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.calibration.camera_geometry import logarithms
 from cdpr_rt.calibration.fit import Fit, locate
-from cdpr_rt.calibration.markers.geometry import logarithms
-from cdpr_rt.calibration.markers.marker_map import best_fit
+from cdpr_rt.calibration.marker_map import best_fit
 from cdpr_rt.calibration.outcome import Outcome, number_or_none
 from cdpr_rt.calibration.parameters import DRUM, OFFSET, CableGeometry
 from cdpr_rt.calibration.verification import Scale, relative_errors

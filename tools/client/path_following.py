@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
-from cdpr_rt.motion.path.way_points import read_source, require_kind
+from cdpr_rt.motion.way_points import read_source, require_kind
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robot import Faulted, MotionEnded, Robot, end_text
 from cdpr_tools.client.client import Daemon, await_start

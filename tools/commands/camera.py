@@ -11,12 +11,12 @@ import typer
 from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, open_camera
-from cdpr_rt.calibration.markers.detection import Board, IntrinsicsFit, fit_intrinsics
+from cdpr_rt.calibration.marker_detection import Board, IntrinsicsFit, fit_intrinsics
 from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption, argument, option
 from cdpr_tools.errors import WorkFailedError, os_error_as
 from cdpr_tools.output import Output
-from cdpr_tools.report.save import require_free, save
+from cdpr_tools.saving import require_free, save
 
 app = typer.Typer(
     name="camera", help="Take images with a camera and calibrate its lens.", no_args_is_help=True

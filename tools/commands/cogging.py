@@ -34,7 +34,7 @@ from cdpr_tools.commands import options
 from cdpr_tools.commands.commission import IndexOption
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
-from cdpr_tools.commission import axis_sweep, build, comparison, summary
+from cdpr_tools.commission import axis_sweep, comparison, summary
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
 from cdpr_tools.commission.run import prepare
 from cdpr_tools.composition.session import confirm_motion, open_winch
@@ -239,8 +239,10 @@ def report(
     paths = Paths(folder)
     run = read_run(paths)
     profile: Winch = load_winch(run["winch"])
+    from cdpr_tools.commission import page  # noqa: PLC0415  # slow to load
+
     found = identify(profile, run["latency_s"], paths)
     results = assemble(paths, run, found, true_angle(paths.truth))
-    build(paths, profile, results, found)
+    page.build(paths, profile, results, found)
     out.say(f"report: {paths.page}")
     out.result(results)

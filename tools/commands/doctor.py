@@ -14,7 +14,7 @@ from cdpr_tools.commands.options import JsonOption, option
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.host.host_checks import HostFinding, look_around
 from cdpr_tools.output import Output
-from cdpr_tools.report.save import require_free
+from cdpr_tools.saving import require_free
 
 app = typer.Typer()
 

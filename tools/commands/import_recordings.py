@@ -14,7 +14,7 @@ from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commission.run import prepare
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
-from cdpr_tools.report.save import require_free
+from cdpr_tools.saving import require_free
 
 app = typer.Typer(
     name="import",

@@ -24,17 +24,17 @@ from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reader import validated
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.detection import Board, MarkerDetector, dictionary_shown
-from cdpr_rt.calibration.markers.geometry import logarithms
-from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
-from cdpr_rt.calibration.markers.marker_map import Coverage, Sighting
+from cdpr_rt.calibration.camera_geometry import logarithms
+from cdpr_rt.calibration.marker_detection import Board, MarkerDetector, dictionary_shown
+from cdpr_rt.calibration.marker_map import Coverage, Sighting
+from cdpr_rt.calibration.marker_map_fit import MapFit, fit_map, verdict
 from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.commands import options
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
 from cdpr_tools.output import Output
-from cdpr_tools.report.save import require_free, save
-from cdpr_tools.report.style import LINES, colour_bar, legend_beside_title, save_figure
+from cdpr_tools.saving import require_free, save
+from cdpr_tools.style import LINES, colour_bar, legend_beside_title, save_figure
 
 # Marker sheets at true size, as PDF: one marker per page, with a bar to check the printer.
 

@@ -15,7 +15,7 @@ import typer
 from cdpr_profiles.bounded_input import may_replace
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.report.save import OWN_MARK
+from cdpr_tools.saving import OWN_MARK
 
 
 def option(text: str, /, *names: str, **more: Any) -> Any:

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drivers.rails.rail import Cia402RailAxis, MoveConditions, move
-from cdpr_drivers.rails.rail_session import (
+from cdpr_drivers.robot.rail import Cia402RailAxis, MoveConditions, move
+from cdpr_drivers.robot.rail_session import (
     open_rail,
     position_of,
     power_watch,

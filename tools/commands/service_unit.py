@@ -23,7 +23,7 @@ from cdpr_tools.commands import run
 from cdpr_tools.commands.options import RobotOrWinchArgument, option
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.report.page import rendered
+from cdpr_tools.rendering import rendered
 
 _SOCKETS = Path("/run/cdpr-rt")
 _ASIDE = ("open_it", "robot", "yes", "as_json", "exit_with_stdin")

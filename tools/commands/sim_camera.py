@@ -22,7 +22,7 @@ from cdpr_tools.commands.options import argument, option
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers
 from cdpr_tools.output import Output
-from cdpr_tools.report.save import require_free, save
+from cdpr_tools.saving import require_free, save
 
 _PlantOption = Annotated[
     Path | None, option("Camera's plant file: the truth about lens, mount, light and markers.")

@@ -19,14 +19,9 @@ from cdpr_rt.core.clock import Clock, PacedClock
 from cdpr_tools.commands import options
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
-from cdpr_tools.composition.session import confirm_motion, find_bus, open_winch
-from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.output import Output
-from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
-from cdpr_tools.signals import stop_on_signals
-from cdpr_tools.tension import calibration as tension_calibration
-from cdpr_tools.tension import watch as watching
-from cdpr_tools.tension.calibration import (
+from cdpr_tools.commission import tension_calibration
+from cdpr_tools.commission import tension_watch as watching
+from cdpr_tools.commission.tension_calibration import (
     TOLERANCE,
     AnchorPlan,
     Hang,
@@ -38,7 +33,12 @@ from cdpr_tools.tension.calibration import (
     plan_anchor,
     plan_hoist,
 )
-from cdpr_tools.tension.watch import by_prompt, on_board
+from cdpr_tools.commission.tension_watch import by_prompt, on_board
+from cdpr_tools.composition.session import confirm_motion, find_bus, open_winch
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+from cdpr_tools.output import Output
+from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
+from cdpr_tools.signals import stop_on_signals
 
 app = typer.Typer(name="tension", help="Read, tare and calibrate load cells.", no_args_is_help=True)
 
@@ -265,7 +265,7 @@ def _finish(out: Output, folder: Path, winch: Winch) -> None:
     with keeping_raw_data(tension_calibration.raw_folder(folder)):
         found, points = tension_calibration.calibrate(folder, winch)
     path, picture = folder / tension_calibration.FILE_NAME, folder / tension_calibration.PICTURE
-    from cdpr_tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
+    from cdpr_tools.commission.tension_picture import draw_calibration  # noqa: PLC0415  # slow to load
 
     with os_error_as(WorkFailedError, f"{picture}: cannot be written"):
         draw_calibration(picture, points, found)

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_tools.commission.curves import ResidualEffort
-from cdpr_tools.report.style import (
+from cdpr_tools.style import (
     BACKWARD,
     COLOURS,
     DIRECTIONS,

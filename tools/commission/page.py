@@ -16,8 +16,8 @@ from cdpr_tools.commission.curves import Ramp, ResidualEffort
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import to_json
 from cdpr_tools.recordings.truth import Truth
-from cdpr_tools.report.page import rendered
-from cdpr_tools.report.save import save
+from cdpr_tools.rendering import rendered
+from cdpr_tools.saving import save
 
 _SPEEDS_RAD_S = (math.radians(1.0), math.radians(600.0))
 _ORDERS_SHOWN = 100

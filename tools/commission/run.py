@@ -18,7 +18,7 @@ from cdpr_rt.errors import ControlError, InterruptedMotionError, InvalidRequestE
 from cdpr_rt.procedures.commissioning_results import Paths, assemble, identify
 from cdpr_rt.procedures.measurement import Index
 from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot
-from cdpr_tools.commission import build, summary
+from cdpr_tools.commission import summary
 from cdpr_tools.commission.commissioning import (
     DEFAULT_BANDWIDTH_HZ,
     QUICK,
@@ -60,7 +60,10 @@ def commission_winch(
         write(paths.run, to_json(run, indent=1))
         found = identify(winch, run["latency_s"], paths)
         results = assemble(paths, run, found, true_angle(paths.truth))
-        build(paths, winch, results, found)
+        # imported here, to save memory while the motor turns and while it is identified
+        from cdpr_tools.commission import page  # noqa: PLC0415
+
+        page.build(paths, winch, results, found)
     summary.show(out, results)
     return results
 

@@ -21,7 +21,7 @@ from cdpr_rt.service.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 from cdpr_tools.recordings.summary import WHILE_ACTIVE, Reasons, is_fault, why_while_active
-from cdpr_tools.report.style import (
+from cdpr_tools.style import (
     SERIES,
     decimated,
     legend_above,

@@ -28,7 +28,7 @@ from cdpr_tools.errors import (
     os_error_as,
     raised_as,
 )
-from cdpr_tools.report.save import require_free
+from cdpr_tools.saving import require_free
 
 ELAPSED = "elapsed_s"
 """Name of an added column: seconds since the first row, over all files."""

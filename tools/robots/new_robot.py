@@ -22,7 +22,7 @@ from cdpr_rt.model.platform_model import platform_model
 from cdpr_rt.model.robot_arrays import RATED_SPEED_SHARE
 from cdpr_rt.model.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.report.page import rendered
+from cdpr_tools.rendering import rendered
 from cdpr_tools.robots.questions import (
     KINDS,
     AnswerError,

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.motion.path.gcode import GcodeSettings
-from cdpr_rt.motion.path.way_points import GCODE
+from cdpr_rt.motion.gcode import GcodeSettings
+from cdpr_rt.motion.way_points import GCODE
 from cdpr_tools.errors import BadInputError
 
 DEFAULT_BLEND_mm: Final = 1.0

@@ -15,7 +15,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.statics import Box, PlatformStatics, statics_of, view_of
-from cdpr_tools.report import style
+from cdpr_tools import style
 
 _PLATFORM = "#d1581a"
 _WIDE_in = 7.4

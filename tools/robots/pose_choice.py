@@ -25,10 +25,10 @@ from cdpr_rt.calibration.pose_choice import (
 )
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.reachable import Reach, Reached
-from cdpr_rt.motion.path.description import Coordinates, PathDescription
-from cdpr_rt.motion.path.way_points import MOST_BYTES, read_csv_points, read_toml_points
+from cdpr_rt.motion.path_description import Coordinates, PathDescription
+from cdpr_rt.motion.way_points import MOST_BYTES, read_csv_points, read_toml_points
+from cdpr_tools import style
 from cdpr_tools.errors import BadInputError, os_error_as
-from cdpr_tools.report import style
 
 AMONG = 20
 """Number of random poses for each chosen pose."""

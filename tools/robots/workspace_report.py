@@ -21,8 +21,8 @@ from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.statics import Box
 from cdpr_rt.model.workspace_analysis import Rays, Triangles
-from cdpr_tools.report.style import LINES, colour_bar, label_view, save_figure
 from cdpr_tools.robots.workspace_search import Found, Search, in_mm
+from cdpr_tools.style import LINES, colour_bar, label_view, save_figure
 
 _AGREE = 0.02
 

@@ -15,7 +15,7 @@ from scipy import stats
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.bench.harness import table
 from cdpr_tools.output import TableText
-from cdpr_tools.report.style import SERIES, legend_above, save_figure
+from cdpr_tools.style import SERIES, legend_above, save_figure
 from cdpr_tools.teleop.experiment_trial import Points
 
 

@@ -10,7 +10,7 @@ from matplotlib.patches import Ellipse
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.model.robot_arrays import limits_of
-from cdpr_tools.report.style import (
+from cdpr_tools.style import (
     BOUND,
     SERIES,
     box_of_targets,

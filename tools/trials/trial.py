@@ -18,8 +18,8 @@ from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
-from cdpr_tools.report.style import save_figure
 from cdpr_tools.robots.calibration_text import calibration_text
+from cdpr_tools.style import save_figure
 from cdpr_tools.trials import limits, line, path, pictures, streaming, tape, targets
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.figures import Figure, all_reached, figures_table

@@ -19,7 +19,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.camera import CameraIntrinsics, KnownMarker, MarkerSheets
 from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import (
     CalibrationData,
     CameraSetup,

@@ -11,7 +11,7 @@ import pytest
 
 from cdpr_profiles.camera import CameraIntrinsics, KnownMarker, MarkerSheets
 from cdpr_profiles.errors import ProfileError
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import (
     CalibrationData,
     CameraSetup,

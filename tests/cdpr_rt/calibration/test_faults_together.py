@@ -11,7 +11,7 @@ import pytest
 
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.faults import Fault
-from cdpr_rt.calibration.markers.marker_map import Sighting, coverage
+from cdpr_rt.calibration.marker_map import Sighting, coverage
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.verification import relative_errors
 from tests.cdpr_rt.calibration.camera_robot import FEW, CameraRobot, camera_robot

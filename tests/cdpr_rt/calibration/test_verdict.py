@@ -12,9 +12,9 @@ import pytest
 from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.calibration.calibrate import calibrate
+from cdpr_rt.calibration.camera_geometry import exponentials
 from cdpr_rt.calibration.faults import fit_without_faults, without_slack
 from cdpr_rt.calibration.fit import fit
-from cdpr_rt.calibration.markers.geometry import exponentials
 from cdpr_rt.calibration.outcome import CalibrationFiles, calibration_of
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.verdict import open_directions, predicted_std, require_enough

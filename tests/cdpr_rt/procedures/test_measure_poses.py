@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.measure_poses import (
     Measured,

@@ -15,9 +15,9 @@ import pytest
 from scipy.spatial import KDTree
 
 from cdpr_rt.core.shared_block import PATH
-from cdpr_rt.motion.path.description import Coordinates, Move, PathDescription
-from cdpr_rt.motion.path.nodes import nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
+from cdpr_rt.motion.path_description import Coordinates, Move, PathDescription
+from cdpr_rt.motion.path_nodes import nodes_of
+from cdpr_rt.motion.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
 from cdpr_rt.programs import path_store
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.path import PathProgram

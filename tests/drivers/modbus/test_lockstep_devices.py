@@ -22,7 +22,7 @@ import pytest
 
 from cdpr_drivers.modbus.safety_io import SafetyIo, SafetyIoError
 from cdpr_drivers.modbus.tension import TensionSampler
-from cdpr_drivers.rails.rail import ModbusRailAxis, MoveConditions, move
+from cdpr_drivers.robot.rail import ModbusRailAxis, MoveConditions, move
 from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.rail import load_rail
 from cdpr_profiles.tension_sensor import load_tension_sensors

@@ -15,7 +15,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.calibrate import calibrate
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, load_data
 from cdpr_rt.calibration.residuals import encoder_lengths

@@ -13,7 +13,7 @@ import pytest
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.geometry_calibration import geometry_sha256
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CalibrationData, load_data
 from cdpr_tools.calibrate import daemon_run, pose_camera, run
 from cdpr_tools.calibrate.pose_operator import PoseOperator, TakeImage

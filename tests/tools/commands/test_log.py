@@ -19,8 +19,8 @@ from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recording import Recorder
 from cdpr_tools.recordings.picture import pose_curves, recorded_stretches, shades
-from cdpr_tools.report.save import save
-from cdpr_tools.report.style import save_figure
+from cdpr_tools.saving import save
+from cdpr_tools.style import save_figure
 from tests.cdpr_rt.service.recording_rig import block_with_clock, made_rows, put
 from tests.tools.recordings.made_recording import record
 

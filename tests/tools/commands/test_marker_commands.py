@@ -13,7 +13,7 @@ from cdpr_here import cdpr_here
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
-from cdpr_rt.calibration.markers.detection import Board, MarkerDetector
+from cdpr_rt.calibration.marker_detection import Board, MarkerDetector
 from cdpr_tools.commands.markers import board_page, marker_page
 
 SCENE = """

@@ -23,7 +23,7 @@ from cdpr_rt.procedures.commissioning_results import Paths, assemble
 from cdpr_tools.commission.page import build
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.recordings.truth import true_angle
-from cdpr_tools.report.page import number
+from cdpr_tools.rendering import number
 from tests.tools.commission.made_up_commissioning import AMPLITUDES_Nm, Commissioned, make_up
 
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.report.save import save
-from cdpr_tools.report.style import save_figure
+from cdpr_tools.saving import save
+from cdpr_tools.style import save_figure
 
 
 def test_a_picture_replaces_the_previous_one(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from matplotlib.text import Text
 
-from cdpr_tools.report.style import canvas, legend_above, legend_beside_title
+from cdpr_tools.style import canvas, legend_above, legend_beside_title
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_rt.motion.path.description import PathError
+from cdpr_rt.motion.path_description import PathError
 from cdpr_rt.service.http_models import PathFile
 from cdpr_tools.client.path_following import plain_name, require_held
 from cdpr_tools.errors import BadInputError, WorkFailedError

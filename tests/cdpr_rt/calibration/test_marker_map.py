@@ -12,9 +12,16 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.camera import KnownMarker, MarkerSheets, MarkerSize
-from cdpr_rt.calibration.markers.bundle import Estimate, adjust
-from cdpr_rt.calibration.markers.geometry import angles, project
-from cdpr_rt.calibration.markers.map_fit import (
+from cdpr_rt.calibration.camera_geometry import angles, project
+from cdpr_rt.calibration.marker_bundle import Estimate, adjust
+from cdpr_rt.calibration.marker_map import (
+    CORNERS,
+    SeenMarkers,
+    Sighting,
+    best_fit,
+    coverage,
+)
+from cdpr_rt.calibration.marker_map_fit import (
     MapFit,
     Suspect,
     first_map,
@@ -22,13 +29,6 @@ from cdpr_rt.calibration.markers.map_fit import (
     square_poses,
     verdict,
     warnings,
-)
-from cdpr_rt.calibration.markers.marker_map import (
-    CORNERS,
-    SeenMarkers,
-    Sighting,
-    best_fit,
-    coverage,
 )
 from cdpr_rt.errors import InvalidRequestError
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
-from cdpr_rt.motion.path.gcode import GcodeSettings, arc_by_radius, read_gcode
-from cdpr_rt.motion.path.nodes import nodes_of, pieces_of
+from cdpr_rt.motion.gcode import GcodeSettings, arc_by_radius, read_gcode
+from cdpr_rt.motion.path_description import Coordinates, PathDescription, PathError
+from cdpr_rt.motion.path_nodes import nodes_of, pieces_of
 
 ROOM = Coordinates(("x", "y", "z", "rx", "ry", "rz"), np.array([0.0, 0.1, 1.4, 0.0, 0.0, 0.0]))
 PLANE = Coordinates(("x", "y"), np.array([0.0, 1.4]))

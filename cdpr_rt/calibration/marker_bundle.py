@@ -15,13 +15,13 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray, rms
-from cdpr_rt.calibration.markers.geometry import (
+from cdpr_rt.calibration.camera_geometry import (
     cross_matrices,
     exponentials,
     project,
     project_with_derivatives,
 )
-from cdpr_rt.calibration.markers.marker_map import MarkerMap, SeenMarkers
+from cdpr_rt.calibration.marker_map import MarkerMap, SeenMarkers
 from cdpr_rt.errors import ControlError
 
 # Expected corners in images. Cameras and markers change like poses of the platform:

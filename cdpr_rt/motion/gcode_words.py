@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
-from cdpr_rt.motion.path.description import PathError
+from cdpr_rt.motion.path_description import PathError
 
 _WORD: Final = re.compile(r"\s*([A-Za-z])\s*((?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?)")
 _EXPONENT: Final = re.compile(r"[eE][+-]?[0-9]")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cdpr_profiles.camera import DICTIONARIES, CameraIntrinsics
 from cdpr_profiles.reader import closest
 from cdpr_rt.arrays import BoolArray, FloatArray
-from cdpr_rt.calibration.markers.marker_map import Sighting
+from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.errors import ControlError, InvalidRequestError
 
 # Corners of markers to a few hundredths of a pixel, as intersections of curves fitted to the four

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from toppra import algorithm, constraint
 
-from cdpr_rt.motion.path.description import Arc, Coordinates, Move, PathDescription
-from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
+from cdpr_rt.motion.path_description import Arc, Coordinates, Move, PathDescription
+from cdpr_rt.motion.path_nodes import PathNodes, nodes_of
+from cdpr_rt.motion.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
 
 toppra.setup_logging("ERROR")
 ROOM = Coordinates(("x", "y", "z", "rx", "ry", "rz"), np.zeros(6))

@@ -22,10 +22,10 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.exchange import TensionFault
 from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_tools.commission.tension_calibration import Hang, not_hung
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 from cdpr_tools.streams import discard_typed_ahead
-from cdpr_tools.tension.calibration import Hang, not_hung
 
 _LOOK_S = 0.02
 _SHOW_HZ = 8.0

@@ -17,7 +17,7 @@ from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_drivers.errors import BusError, ConfigurationError
 from cdpr_drivers.modbus.safety_io import SafetyIo
 from cdpr_drivers.modbus.tension import TensionSampler
-from cdpr_drivers.rails.rail import Cia402RailAxis, ModbusRailAxis, RailAxis
+from cdpr_drivers.robot.rail import Cia402RailAxis, ModbusRailAxis, RailAxis
 from cdpr_drivers.robot.safety import CLOSED, connect
 from cdpr_profiles import DriveProfile
 from cdpr_profiles.catalogue import load_rail_drive

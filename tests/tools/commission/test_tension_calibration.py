@@ -10,7 +10,7 @@ import pytest
 from cdpr_profiles import load_winch
 from cdpr_rt.errors import InvalidRequestError, RawLogError
 from cdpr_rt.identification.rawlog import RawLogWriter
-from cdpr_tools.tension.calibration import (
+from cdpr_tools.commission.tension_calibration import (
     check_masses,
     mass_points,
     plan_anchor,

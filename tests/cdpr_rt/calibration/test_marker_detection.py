@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cdpr_rt.calibration.markers.detection import (
+from cdpr_rt.calibration.marker_detection import (
     Board,
     CalibrationError,
     MarkerDetector,

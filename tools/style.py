@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_tools.report.save import OWN_MARK, save
+from cdpr_tools.saving import OWN_MARK, save
 
 COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "harmonic": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from cdpr_profiles.camera import MarkerSheets, rotation_vector_rad
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
-from cdpr_rt.calibration.markers.geometry import angles, exponentials, nearest_rotation
+from cdpr_rt.calibration.camera_geometry import angles, exponentials, nearest_rotation
 from cdpr_rt.errors import InvalidRequestError
 
 # Markers seen in a set of images.

@@ -14,14 +14,14 @@ from scipy.stats import chi2
 
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_rt.arrays import FloatArray, IntArray, rms
-from cdpr_rt.calibration.markers.bundle import LENS_PARAMETERS, Bundle, Estimate, adjust
-from cdpr_rt.calibration.markers.geometry import (
+from cdpr_rt.calibration.camera_geometry import (
     angles,
     camera_matrix,
     exponentials,
     nearest_rotation,
 )
-from cdpr_rt.calibration.markers.marker_map import (
+from cdpr_rt.calibration.marker_bundle import LENS_PARAMETERS, Bundle, Estimate, adjust
+from cdpr_rt.calibration.marker_map import (
     Coverage,
     MarkerMap,
     SeenMarkers,

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.identification.tension_gain import TorquePoint
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
+from cdpr_tools.style import BACKWARD, FORWARD, canvas, legend_above, save_figure
 
 _SIDES = ((True, FORWARD, "winding in", 1.0), (False, BACKWARD, "paying out", -1.0))
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cdpr_profiles.errors import ProfileError
-from cdpr_rt.motion.path.description import Coordinates, PathError
-from cdpr_rt.motion.path.gcode import GcodeSettings
-from cdpr_rt.motion.path.nodes import nodes_of
-from cdpr_rt.motion.path.way_points import read_path
+from cdpr_rt.motion.gcode import GcodeSettings
+from cdpr_rt.motion.path_description import Coordinates, PathError
+from cdpr_rt.motion.path_nodes import nodes_of
+from cdpr_rt.motion.way_points import read_path
 
 PLANE = Coordinates(("x", "y", "angle"), np.zeros(3))
 SETTINGS = GcodeSettings(np.zeros(2))

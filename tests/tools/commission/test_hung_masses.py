@@ -15,9 +15,9 @@ import pytest
 
 from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.errors import InvalidRequestError
-from cdpr_tools.tension import watch
-from cdpr_tools.tension.calibration import have_hung
-from cdpr_tools.tension.watch import by_prompt
+from cdpr_tools.commission import tension_watch as watch
+from cdpr_tools.commission.tension_calibration import have_hung
+from cdpr_tools.commission.tension_watch import by_prompt
 from tests.cdpr_rt.loop.operating_rig import Inertias, powered
 
 LONGEST_S = 60.0
@@ -51,7 +51,7 @@ def test_only_an_empty_line_confirms_the_mass(
 def test_an_open_question_does_not_disturb_the_end_of_the_process() -> None:
     ask = (
         "from cdpr_rt.core.clock import PacedClock as C\n"
-        "from cdpr_tools.tension.watch import by_prompt"
+        "from cdpr_tools.commission.tension_watch import by_prompt"
     )
     catch = "\ntry: by_prompt(5.0, C())\nexcept Exception as error: print(error)"
     with subprocess.Popen(

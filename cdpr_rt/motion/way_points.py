@@ -15,14 +15,14 @@ from pydantic import Field
 from cdpr_profiles.bounded_input import read_bytes, read_text
 from cdpr_profiles.errors import ProfileError, brief, value_text
 from cdpr_profiles.reader import Profile, read_toml_model
-from cdpr_rt.motion.path.description import (
+from cdpr_rt.motion.gcode import GcodeSettings, read_gcode
+from cdpr_rt.motion.path_description import (
     Coordinates,
     LONGEST_DWELL_s,
     Move,
     PathDescription,
     PathError,
 )
-from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 
 _HEADS: Final = re.compile(r"^\s*\[\[\s*points\s*\]\]", re.MULTILINE)
 _UNITS: Final = {

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
-from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
+from cdpr_rt.motion.path_description import Coordinates, PathDescription, PathError
 
 # Lines and arcs of a path as arrays, and the cut corners between them. Length along the path is
 # weighted: ds² = |dp|² + (scale dφ)². A metre of an anchor point counts like a metre of the origin,

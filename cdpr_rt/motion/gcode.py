@@ -12,19 +12,19 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.motion.path.description import (
-    Arc,
-    Coordinates,
-    LONGEST_DWELL_s,
-    Move,
-    PathDescription,
-)
-from cdpr_rt.motion.path.gcode_words import (
+from cdpr_rt.motion.gcode_words import (
     NEVER_IGNORED,
     Block,
     Findings,
     blocks,
     require_ignorable,
+)
+from cdpr_rt.motion.path_description import (
+    Arc,
+    Coordinates,
+    LONGEST_DWELL_s,
+    Move,
+    PathDescription,
 )
 
 # Arcs between two points of a plane, by their centre or their radius.

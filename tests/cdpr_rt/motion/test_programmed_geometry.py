@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
-from cdpr_rt.motion.path.description import Coordinates
-from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
-from cdpr_rt.motion.path.nodes import nodes_of
-from cdpr_rt.motion.path.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
-from tests.cdpr_rt.motion.path.rs274 import distances_mm, programmed_mm
+from cdpr_rt.motion.gcode import GcodeSettings, read_gcode
+from cdpr_rt.motion.path_description import Coordinates
+from cdpr_rt.motion.path_nodes import nodes_of
+from cdpr_rt.motion.time_scaling import PathLimits, TimedPath, WrenchBounds, time_path
+from tests.cdpr_rt.motion.rs274 import distances_mm, programmed_mm
 
 ROOM = Coordinates(("x", "y", "z"), np.zeros(3))
 EXACT_mm = 0.01

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.camera import CameraIntrinsics
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.markers.geometry import logarithms, project
-from cdpr_rt.calibration.markers.marker_map import CORNERS, MarkerMap, SeenMarkers, Sighting
+from cdpr_rt.calibration.camera_geometry import logarithms, project
+from cdpr_rt.calibration.marker_map import CORNERS, MarkerMap, SeenMarkers, Sighting
 
 LENS = np.array([604.0, 606.0, 322.3, 255.8, -0.112, 0.083, 4e-4, -3e-4, -0.012])
 WIDTH, HEIGHT = 640, 512

@@ -11,7 +11,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from cdpr_tools.report.save import OWN_MARK
+from cdpr_tools.saving import OWN_MARK
 
 
 def rendered(template: str, **facts: Any) -> str:
@@ -23,7 +23,7 @@ def rendered(template: str, **facts: Any) -> str:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("cdpr_tools.report"),
+        loader=PackageLoader("cdpr_tools"),
         undefined=StrictUndefined,
         autoescape=select_autoescape([".html.j2"]),
         keep_trailing_newline=True,

@@ -17,7 +17,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
-from cdpr_rt.motion.path.nodes import EXACT_m, PathNodes
+from cdpr_rt.motion.path_nodes import EXACT_m, PathNodes
 
 # Kernel of the polynomial of fifth order between two nodes with two derivatives each.
 

@@ -1,1 +1,0 @@
-"""Marker maps: detection, bundle adjustment, diagnosis."""

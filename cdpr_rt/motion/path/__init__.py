@@ -1,1 +1,0 @@
-"""Paths: read from way points or G-code, drawn through blended corners, timed within limits."""

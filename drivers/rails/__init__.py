@@ -1,1 +1,0 @@
-"""Linear rails that move exit points."""

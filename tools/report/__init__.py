@@ -1,1 +1,0 @@
-"""Shared by all reports and pictures: style, page templates, and writing of files."""

@@ -1,1 +1,0 @@
-"""Cable tensions at the terminal: watch them, and calibrate a winch with them."""
