@@ -48,9 +48,9 @@ def test_a_wheel_runs_beside_folders_of_the_same_names(tmp_path: Path) -> None:
         *(path.name for path in (REPOSITORY / "src").iterdir() if path.is_symlink()),
     }
 
-    templates = target / "cdpr_tools" / "report" / "templates"
+    templates = target / "cdpr_tools" / "templates"
     assert {path.name for path in templates.iterdir()} == {
-        path.name for path in (REPOSITORY / "tools" / "report" / "templates").iterdir()
+        path.name for path in (REPOSITORY / "tools" / "templates").iterdir()
     }
 
     def run(*words: str) -> str:
