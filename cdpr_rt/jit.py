@@ -1,24 +1,18 @@
 """Compile the numeric kernels of the cycle to machine code."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, TypeVarTuple, cast
 
-import numba
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from cdpr_profiles.jit import jit as compiled
+from cdpr_profiles.jit import bound, jit
+
+__all__ = ["bound", "bound_to", "copy_bytes", "jit", "jit_inlined", "jit_unlocked"]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_T = TypeVar("_T")
 _Objects = TypeVarTuple("_Objects")
-
-
-def jit(function: _F) -> _F:
-    """Return `function` compiled by numba, see `cdpr_profiles.jit`."""
-    return compiled(function)
 
 
 def machine_code_folder() -> Path | None:
@@ -34,26 +28,12 @@ def jit_inlined(function: _F) -> _F:
     Use it for functions that take less time than the call itself, which passes nine numbers per
     array.
     """
-    return compiled(function, forceinline=True)
+    return jit(function, forceinline=True)
 
 
 def jit_unlocked(function: _F) -> _F:
     """Return `function` compiled as by `jit`, without the GIL: other threads run while it waits."""
-    return compiled(function, nogil=True)
-
-
-def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -> Callable[..., _T]:
-    """Return the compiled `kernel` with its first arguments fixed.
-
-    An ordinary call looks up the machine code for the types of its arguments every time, which
-    costs more than most kernels. The bound kernel looks it up once. `then` has an example of each
-    remaining argument. Later calls do not check types, so an array must have the type and
-    contiguity of its example. Compiles the kernel if necessary.
-    """
-    dispatcher: Any = kernel
-    type_of: Callable[[Any], Any] = numba.typeof
-    types = tuple(type_of(argument) for argument in (*arrays, *then))
-    return partial(dispatcher.compile(types), *arrays)
+    return jit(function, nogil=True)
 
 
 def bound_to(bind: Callable[[*_Objects], _F]) -> Callable[[*_Objects], _F]:

@@ -46,6 +46,7 @@ _RUNTIME: Any = cast(Any, runtime).rtsys
 _BITCODE: Any = cast(Any, codegen).ll
 _NJIT: Any = numba.njit  # its types do not include all of its options
 _F = TypeVar("_F", bound=Callable[..., Any])
+_T = TypeVar("_T")
 
 
 def _skip_blas() -> None:
@@ -384,10 +385,13 @@ def _constant_text(value: Any) -> str:
     )
 
 
-def bound(kernel: Callable[..., Any], *arrays: Any, then: tuple[Any, ...]) -> Callable[..., Any]:
-    """Return the compiled `kernel` with its first arguments bound, so that calls check no types.
+def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -> Callable[..., _T]:
+    """Return the compiled `kernel` with its first arguments fixed.
 
-    `then` has an example of each remaining argument.
+    An ordinary call looks up the machine code for the types of its arguments every time, which
+    costs more than most kernels. The bound kernel looks it up once. `then` has an example of each
+    remaining argument. Later calls do not check types, so an array must have the type and
+    contiguity of its example. Compiles the kernel if necessary.
     """
     dispatcher: Any = kernel
     type_of: Callable[[Any], Any] = numba.typeof

@@ -23,7 +23,6 @@ from cdpr_rt.core.clock import Clock
 from cdpr_tools.calibrate.daemon_run import (
     DaemonPoses,
     image_taker,
-    no_poses,
     read_places,
     robot_of,
 )
@@ -31,7 +30,7 @@ from cdpr_tools.calibrate.finish import identified, with_hand_eye
 from cdpr_tools.calibrate.places import chosen_places
 from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError
 from cdpr_tools.calibrate.rig import simulated_rig
-from cdpr_tools.calibrate.run import DATA
+from cdpr_tools.calibrate.run import DATA, no_poses
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -177,7 +176,7 @@ def checked_running(
 def _nothing_read(folder: Path, robot: Robot, known: Before | None, simulated: bool) -> DaemonPoses:
     """Return the empty data of a new check, in its folder."""
     camera = None if known is None else known.setup
-    data = no_poses(robot, simulated).model_copy(update={"camera": camera})
+    data = no_poses(robot, simulated, camera)
     return DaemonPoses(folder, data, CHECK)
 
 

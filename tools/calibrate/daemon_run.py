@@ -7,15 +7,14 @@ import os
 import select
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
-from datetime import UTC, datetime
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from pydantic import Field
 
-from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
@@ -26,20 +25,13 @@ from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, PoseReading, load_points
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.errors import ControlError
-from cdpr_rt.procedures.measure_poses import (
-    Measured,
-    PoseRefusedError,
-    measure_poses,
-    read_pose,
-)
-from cdpr_tools.calibrate.places import (
-    Places,
-)
-from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError, TakeImage
-from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES, StopCriterion, refuse_foreign
+from cdpr_rt.procedures.measure_poses import Measured, PoseRefusedError, read_pose
+from cdpr_tools.calibrate import run
+from cdpr_tools.calibrate.places import Places
+from cdpr_tools.calibrate.pose_operator import PoseOperator, TakeImage
+from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES
 from cdpr_tools.client.client import Daemon
-from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.streams import discard_typed_ahead
 
@@ -83,22 +75,12 @@ def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> R
     return robot
 
 
-def no_poses(robot: Robot, simulated: bool) -> CalibrationData:
-    """Return data without poses, for a robot that has not been measured yet."""
-    return CalibrationData(
-        robot=robot.profile,
-        geometry_sha256=geometry_sha256(robot),
-        simulated=simulated,
-        date=datetime.now(UTC).isoformat(timespec="seconds"),
-        poses=(),
-    )
-
-
-class DaemonPoses:
+@dataclass
+class DaemonPoses(run.StoredPoses):
     """Poses of a robot that a daemon runs, in a folder; each is stored as soon as it is read."""
 
-    def __init__(self, folder: Path, data: CalibrationData, name: str = DATA) -> None:
-        self.folder, self.data, self._path = folder, data, folder / name
+    name: str = DATA
+    """Name of the file."""
 
     def require_home(self, robot: Robot, place: FloatArray) -> None:
         """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
@@ -133,7 +115,7 @@ class DaemonPoses:
 
     def save(self) -> None:
         """Write the data; raises ProfileError."""
-        self.data.save(self._path)
+        self.data.save(self.folder / self.name)
 
 
 def read_into(reader: PoseOperator, robot: Robot, kept: DaemonPoses) -> None:
@@ -155,9 +137,9 @@ def data_of(folder: Path, robot: Robot, simulated: bool) -> CalibrationData:
 
     Raises ProfileError, BadInputError.
     """
-    data = refuse_foreign(folder)
+    data = run.refuse_foreign(folder)
     if data is None:
-        return no_poses(robot, simulated)
+        return run.no_poses(robot, simulated)
     if (data.robot, data.geometry_sha256, data.simulated) != (
         robot.profile,
         geometry_sha256(robot),
@@ -254,16 +236,9 @@ Ask = Callable[[int], None]
 """Asks a person for the measured position at a pose, counted from 1."""
 
 
-@contextmanager
-def going_on(kept: DaemonPoses) -> Iterator[None]:
-    """Add to any error of the block how to continue; StoppedError becomes WorkFailedError."""
-    try:
-        yield
-    except StoppedError:
-        raise WorkFailedError(f"stopped; {_going_on(kept)}") from None
-    except (CommandError, ControlError, DriverError) as error:
-        error.add_note(_going_on(kept))
-        raise
+def going_on(kept: DaemonPoses) -> AbstractContextManager[None]:
+    """Add to any error of the block how to continue; see `saying_how_to_continue`."""
+    return run.saying_how_to_continue(kept, "the same command continues after them")
 
 
 def read_places(
@@ -273,7 +248,7 @@ def read_places(
     kept: DaemonPoses,
     places: Places,
     most: int,
-    criterion: StopCriterion = lambda _data: None,
+    criterion: run.StopCriterion = lambda _data: None,
     ask: Ask = lambda _pose: None,
 ) -> None:
     """Read home if there are no poses yet, then places until `most` or `criterion` is reached.
@@ -295,25 +270,13 @@ def read_places(
         measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
         done = {reading.target for reading in before.poses} | set(before.tried)
         try:
-            for batch in places.batches():
-                left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-                left = left[: most - len(measured.readings)]
-                measure_poses(operator, left, places.middle, measured, out)
-                if len(measured.readings) >= most or (len(left) and criterion(kept.data)):
-                    return
+            run.read_batches(
+                *(out, operator, places, most, measured, done), lambda: criterion(kept.data)
+            )
         finally:
             update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
             kept.data = kept.data.model_copy(update=update)
             kept.save()
-    out.note(f"only {len(measured.readings)} poses: the robot refused all others")
-
-
-def _going_on(kept: DaemonPoses) -> str:
-    if not kept.data.poses:
-        return "nothing was read yet"
-    count = len(kept.data.poses)
-    are = "1 pose is" if count == 1 else f"{count} poses are"
-    return f"{are} saved in {kept.folder}; the same command continues after them"
 
 
 # Ask a person for the measured position while the platform stands; store it in a file of points.

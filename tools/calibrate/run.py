@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Container, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -43,7 +43,7 @@ from cdpr_tools.calibrate.places import (
     listed_places,
     places_of,
 )
-from cdpr_tools.calibrate.pose_operator import StoppedError
+from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError
 from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator, simulated_rig
 from cdpr_tools.calibrate.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -118,12 +118,30 @@ StopCriterion = Callable[[CalibrationData], str | None]
 """Called after each batch; returns why no more poses are needed, None if more are."""
 
 
+def no_poses(robot: Robot, simulated: bool, camera: CameraSetup | None = None) -> CalibrationData:
+    """Return data without poses, for a robot that has not been measured yet."""
+    return CalibrationData(
+        robot=robot.profile,
+        geometry_sha256=geometry_sha256(robot),
+        simulated=simulated,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        camera=camera,
+        poses=(),
+    )
+
+
 @dataclass
-class StoredRun:
-    """Readings of a run, in the files of its folder; the files are complete after each pose."""
+class StoredPoses:
+    """Readings of a calibration in its folder."""
 
     folder: Path
     data: CalibrationData
+
+
+@dataclass
+class StoredRun(StoredPoses):
+    """Readings of a run, in the files of its folder; the files are complete after each pose."""
+
     outside: list[OutsidePose] = field(default_factory=list)
 
     @classmethod
@@ -148,14 +166,7 @@ class StoredRun:
                 (folder / IMAGES).rmdir()
         except OSError as error:
             raise ProfileError(folder, "", f"cannot be emptied: {error.strerror}") from error
-        data = CalibrationData(
-            robot=robot.profile,
-            geometry_sha256=geometry_sha256(robot),
-            simulated=True,
-            date=datetime.now(UTC).isoformat(timespec="seconds"),
-            camera=camera,
-            poses=(),
-        )
+        data = no_poses(robot, True, camera)
         data.save(folder / DATA)
         return cls(folder, data)
 
@@ -234,33 +245,29 @@ def measure(
         images = kept.folder / IMAGES
         return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
 
-    try:
-        with (
-            stop_on_signals("the robot is brought to rest and switched off") as stop,
-            ExitStack() as stack,
-        ):
-            with out.stage(f"{robot.profile}: starting the simulated robot"):
-                operator = stack.enter_context(
-                    simulated_rig(
-                        str(robot.path),
-                        plant=plant,
-                        scanner=settings.source == "scanner",
-                        camera=camera if settings.source == "camera" else None,
-                        stop=stop,
-                    )
+    how = f"continue with: cdpr calibrate run {robot.reference} --resume --out {kept.folder}"
+    with (
+        saying_how_to_continue(kept, how),
+        stop_on_signals("the robot is brought to rest and switched off") as stop,
+        ExitStack() as stack,
+    ):
+        with out.stage(f"{robot.profile}: starting the simulated robot"):
+            operator = stack.enter_context(
+                simulated_rig(
+                    str(robot.path),
+                    plant=plant,
+                    scanner=settings.source == "scanner",
+                    camera=camera if settings.source == "camera" else None,
+                    stop=stop,
                 )
-            up_to = "" if settings.poses else "up to "
-            advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
-            _Measuring(out, operator, kept, most, advance).go(
-                robot,
-                places,
-                criterion if settings.poses is None else report_faults_only(criterion),
             )
-    except StoppedError:
-        raise WorkFailedError(f"stopped; {_going_on(robot, kept)}") from None
-    except (CommandError, ControlError, DriverError) as error:
-        error.add_note(_going_on(robot, kept))
-        raise
+        up_to = "" if settings.poses else "up to "
+        advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
+        _Measuring(out, operator, kept, most, advance).go(
+            robot,
+            places,
+            criterion if settings.poses is None else report_faults_only(criterion),
+        )
     return kept.data
 
 
@@ -317,14 +324,45 @@ def truth_comparison_of_folder(
     return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
 
 
-def _going_on(robot: Robot, kept: StoredRun) -> str:
-    if not kept.data.poses:
-        return "nothing was read yet"
-    return (
-        f"{len(kept.data.poses)} poses are saved in {kept.folder}; continue with: cdpr "
-        "calibrate run "
-        f"{robot.reference} --resume --out {kept.folder}"
-    )
+@contextmanager
+def saying_how_to_continue(kept: StoredPoses, how: str) -> Iterator[None]:
+    """Add to any error of the block what is saved, and `how` to continue.
+
+    StoppedError becomes WorkFailedError.
+    """
+
+    def saved() -> str:
+        if not (count := len(kept.data.poses)):
+            return "nothing was read yet"
+        are = "1 pose is" if count == 1 else f"{count} poses are"
+        return f"{are} saved in {kept.folder}; {how}"
+
+    try:
+        yield
+    except StoppedError:
+        raise WorkFailedError(f"stopped; {saved()}") from None
+    except (CommandError, ControlError, DriverError) as error:
+        error.add_note(saved())
+        raise
+
+
+def read_batches(
+    out: Output,
+    operator: PoseOperator,
+    places: Places,
+    most: int,
+    measured: Measured,
+    done: Container[tuple[float, ...]],
+    enough: Callable[[], object],
+) -> None:
+    """Read batches of places that are not `done`, until there are `most` poses or `enough`."""
+    for batch in places.batches():
+        left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+        left = left[: most - len(measured.readings)]
+        measure_poses(operator, left, places.middle, measured, out)
+        if len(measured.readings) >= most or (len(left) and enough()):
+            return
+    out.note(f"only {len(measured.readings)} poses: the robot refused all others")
 
 
 def _scanned_s(pose: int) -> float:
@@ -376,22 +414,16 @@ class _Measuring:
                 self._kept.save(self._measured)
 
     def _go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
-        operator, measured = self._operator, self._measured
-        done = self._kept.done()
+        operator, measured, done = self._operator, self._measured, self._kept.done()
         try:
             measured.add(read_pose(operator, operator.tighten()))
         except PoseRefusedError as error:
             raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
         self._look_at_home()
-        for batch in places.batches():
-            left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-            left = left[: self._most - len(measured.readings)]
-            measure_poses(operator, left, places.middle, measured, self._out)
-            if len(measured.readings) >= self._most:
-                return
-            if len(left) and self._judged(criterion):
-                return
-        self._out.note(f"only {len(measured.readings)} poses: the robot refused all others")
+        read_batches(
+            *(self._out, operator, places, self._most, measured, done),
+            lambda: self._judged(criterion),
+        )
 
     def _look_at_home(self) -> None:
         """Report camera problems before the robot moves far; raises WorkFailedError."""
