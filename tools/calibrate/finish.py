@@ -114,26 +114,8 @@ def refuse_foreign_report(folder: Path) -> None:
             require_own(path)
 
 
-def finish(
-    out: Output,
-    robot: Robot,
-    data: CalibrationData,
-    points: Path | None,
-    geometry: CableGeometry,
-    source: Path,
-    folder: Path,
-    dry_run: bool,
-    adopt: bool,
-    compare: CompareWithTruth | None = None,
-    hand_eye: Path | None = None,
-    wanted_mm: float | None = None,
-) -> None:
-    """Print the result of `concluded`; raises typer.Exit with status 1 if it is not good."""
-    result = concluded(
-        *(out, robot, data, points, geometry, source, folder, dry_run, adopt, compare),
-        hand_eye=hand_eye,
-        wanted_mm=wanted_mm,
-    )
+def finish(out: Output, result: dict[str, Any]) -> None:
+    """Output the result of `concluded`; raises typer.Exit with status 1 if it is not good."""
     out.result(result)
     if not result["ok"]:
         raise typer.Exit(WorkFailedError.exit_status)

@@ -180,7 +180,7 @@ def measure(
     with out.stage("choosing poses"):
         from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
         from cdpr_tools.calibrate.daemon_run import AskedPoints, require_points_of  # noqa: PLC0415
-        from cdpr_tools.calibrate.finish import finish, stop_criterion, with_hand_eye  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import concluded, finish, stop_criterion, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
         from cdpr_tools.calibrate.pose_operator import PoseOperator  # noqa: PLC0415
         from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only  # noqa: PLC0415  # slow to load
@@ -219,10 +219,11 @@ def measure(
             asked or (lambda _pose: None),
         )  # fmt: skip
     out.say("the robot holds the platform at the last pose; `cdpr lower` returns it to its stand")
-    finish(
+    result = concluded(
         *(out, robot, kept.data, points if points.exists() else None, geometry),
         *(folder / DATA, folder, dry_run, adopt),
     )
+    finish(out, result)
 
 
 # `cdpr calibrate read`: read the pose at which a robot stands, if people move it.
@@ -307,7 +308,7 @@ def fit_data(
     """
     from cdpr_rt.calibration.readings import load_data  # noqa: PLC0415
     from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
-    from cdpr_tools.calibrate.finish import finish, with_hand_eye  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.finish import concluded, finish, with_hand_eye  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     profile = load_robot(robot)
@@ -317,12 +318,13 @@ def fit_data(
         data /= runs.DATA
     read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
     geometry = geometry_of(profile, identify, known_mm, drum_percent, length_mm)
-    finish(
+    result = concluded(
         *(out, profile, read_before, points, geometry),
         *(data, out_dir or data.parent, dry_run, adopt, compare),
         hand_eye=hand_eye,
         wanted_mm=wanted_mm,
     )
+    finish(out, result)
 
 
 @app.command()
@@ -378,6 +380,7 @@ def run(
         from cdpr_rt.diagnosis.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import (  # noqa: PLC0415  # slow to load
+            concluded,
             finish,
             refuse_foreign_report,
             stop_criterion,
@@ -427,10 +430,11 @@ def run(
     data = runs.measure(
         out, profile, settings, kept, stop_criterion(out, profile, points, geometry)
     )
-    finish(
+    result = concluded(
         *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt),
         runs.truth_comparison_of(profile, settings, folder),
     )
+    finish(out, result)
 
 
 def _require_as_begun(given: Mapping[str, object]) -> None:
