@@ -184,6 +184,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
     return _ByFile(config, log)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run a test that requests a `LocalRobot` in a fork of it."""
+    for value in pyfuncitem.funcargs.values():
+        if hasattr(type(value), "run_in_fork"):
+            value.run_in_fork(pyfuncitem)
+            return True
+    return None
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
     """Limit the time of teardowns too: the limit of a test ends when the test fails."""

@@ -266,7 +266,7 @@ class LockstepRobot:
             )
         self.simulator = simulator
         stack.callback(simulator.stop)
-        self.folder, self._truth_path = simulator.folder, simulator.truth_log
+        self.folder = simulator.folder
         self.block = block = SharedBlock.create(
             len(robot.axes), self._ring_s, 1.0 / self.period_s, private=simulator.local
         )
@@ -302,7 +302,7 @@ class LockstepRobot:
             self.boot()
         self._began = self.rows_written
         if not robot.is_winch:  # the log of a single drive has another format
-            self._truth = stack.enter_context(PoseLogTail(self._truth_path))
+            self._truth = stack.enter_context(PoseLogTail(simulator.truth_log))
         if self._pinned and own is not None:
             stack.enter_context(one_core(own.process.pid))
 
@@ -494,8 +494,7 @@ class LockstepRobot:
     @property
     def truth_log(self) -> Path:
         """The file of the pose log."""
-        assert self._truth_path is not None  # opened with the robot
-        return self._truth_path
+        return self.simulator.truth_log
 
     @property
     def state(self) -> LoopState:

@@ -15,6 +15,7 @@ from cdpr_rt.core.states import LoopState
 from cdpr_rt.robot import Refused
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.pose_log import read_pose_log
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
@@ -39,67 +40,68 @@ def highest_N(robot: LockstepRobot, since: int) -> float:
     return float(log["tension_N"][log["sync_index"] >= since].max())
 
 
-@contextmanager
-def fallen(
-    folder: Path, position_m: list[float], rotation_rad: list[float]
-) -> Iterator[LockstepRobot]:
-    """Yield a robot with power whose platform has fallen from the given pose."""
-    with LockstepRobot(folder / "spatial-8.toml") as robot:
+@pytest.fixture(scope="module")
+def tight(folder: Path) -> Iterator[LockstepRobot]:
+    with local_robot(folder / "spatial-8.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
-        robot.carry_out("pose", position_m=position_m, rotation_rad=rotation_rad)
-        robot.loop.request_power_off()
-        robot.run(3.0)
-        assert robot.state is LoopState.FAULT
-        robot.command("acknowledge")
-        robot.enable()
         yield robot
 
 
-def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(folder: Path) -> None:
-    with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
-        assert turned_deg(robot) > 60.0
-        with pytest.raises(Refused, match="It has come down, may have turned over"):
-            robot.program("tighten")
-        since = robot.cycle + robot.machine.sync_offset
-        with pytest.raises(Refused, match=r"\d cables are up to \d+ mm too short"):
-            robot.program("tighten", **{"from": "home"})
-        robot.run(0.5)
-        assert highest_N(robot, since) < LOOSE_N
-        robot.program("tighten", **{"from": "lengths"})
-        robot.finish(120.0)  # each cable is reeled in separately by decimetres at 50 mm/s
-        assert re.search(
-            r"turned by \d+ deg.*: the cables are not tightened", robot.progress["trouble"]
-        )
-        assert robot.progress["stage"] == "slack" and not robot.progress["tight"]
-        assert highest_N(robot, since) < TAKES_UP_N
+def fall(robot: LockstepRobot, position_m: list[float], rotation_rad: list[float]) -> None:
+    """Let the platform fall from the given pose, and give the robot power again."""
+    robot.carry_out("pose", position_m=position_m, rotation_rad=rotation_rad)
+    robot.loop.request_power_off()
+    robot.run(3.0)
+    assert robot.state is LoopState.FAULT
+    robot.command("acknowledge")
+    robot.enable()
 
 
-def test_tighten_from_lengths_finds_a_platform_that_landed_upright(folder: Path) -> None:
+def test_tighten_does_not_pull_at_a_platform_that_has_turned_over(tight: LockstepRobot) -> None:
+    fall(tight, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0])
+    assert turned_deg(tight) > 60.0
+    with pytest.raises(Refused, match="It has come down, may have turned over"):
+        tight.program("tighten")
+    since = tight.cycle + tight.machine.sync_offset
+    with pytest.raises(Refused, match=r"\d cables are up to \d+ mm too short"):
+        tight.program("tighten", **{"from": "home"})
+    tight.run(0.5)
+    assert highest_N(tight, since) < LOOSE_N
+    tight.program("tighten", **{"from": "lengths"})
+    tight.finish(120.0)  # each cable is reeled in separately by decimetres at 50 mm/s
+    assert re.search(
+        r"turned by \d+ deg.*: the cables are not tightened", tight.progress["trouble"]
+    )
+    assert tight.progress["stage"] == "slack" and not tight.progress["tight"]
+    assert highest_N(tight, since) < TAKES_UP_N
+
+
+def test_tighten_from_lengths_finds_a_platform_that_landed_upright(tight: LockstepRobot) -> None:
     # 15 cm above the stand: from higher up it may tip over
-    with fallen(folder, [0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
-        assert turned_deg(robot) < 20.0  # in use, the platform may be turned by 15 degrees
-        assert robot.status()["last_stop"]["fallen"]
-        with pytest.raises(Refused, match="allowed: from home, lengths"):
-            robot.program("tighten")
-        last = robot.loop.engine.parts.last_stop
-        assert last is not None
-        last.broken[0] = "axis 1: the cable seems broken"
-        assert any(": repair it, then" in notice for notice in robot.status()["notices"])
-        robot.carry_out("tighten", **{"from": "lengths"})
-        assert robot.progress["tight"], robot.progress["trouble"]
-        assert not robot.status()["last_stop"]["fallen"]
-        assert not any(": repair it, then" in notice for notice in robot.status()["notices"])
-        here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
-        assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
-        robot.carry_out("lower")
-        robot.program("tighten")  # at home again, `from` is not needed
+    fall(tight, [0.15, 0.5, 1.45], [0.2, 0.0, 0.0])
+    assert turned_deg(tight) < 20.0  # in use, the platform may be turned by 15 degrees
+    assert tight.status()["last_stop"]["fallen"]
+    with pytest.raises(Refused, match="allowed: from home, lengths"):
+        tight.program("tighten")
+    last = tight.loop.engine.parts.last_stop
+    assert last is not None
+    last.broken[0] = "axis 1: the cable seems broken"
+    assert any(": repair it, then" in notice for notice in tight.status()["notices"])
+    tight.carry_out("tighten", **{"from": "lengths"})
+    assert tight.progress["tight"], tight.progress["trouble"]
+    assert not tight.status()["last_stop"]["fallen"]
+    assert not any(": repair it, then" in notice for notice in tight.status()["notices"])
+    here_m, true_m = tight.progress["position_m"], tight.truth()["position_m"]
+    assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
+    tight.carry_out("lower")
+    tight.program("tighten")  # at home again, `from` is not needed
 
 
 @contextmanager
 def held_by_axes(folder: Path, name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
     """Yield a robot whose platform is suspended with each cable held separately, as by brakes."""
-    with LockstepRobot(folder / f"{name}.toml") as robot:
+    with local_robot(folder / f"{name}.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=position_m)
@@ -135,17 +137,14 @@ def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(
         assert robot.progress["tight"], robot.progress["trouble"]
 
 
-def test_tighten_is_rejected_after_all_drives_lost_power_together(folder: Path) -> None:
-    with LockstepRobot(folder / "spatial-8.toml") as robot:
-        robot.enable()
-        robot.carry_out("tighten")
-        robot.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
-        for axis in range(8):
-            robot.inject(axis, 1, 0x3220)
-        robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
-        robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
-        assert robot.state is LoopState.FAULT
-        robot.command("acknowledge")
-        robot.enable()
-        with pytest.raises(Refused, match="It has come down, may have turned over"):
-            robot.program("tighten")
+def test_tighten_is_rejected_after_all_drives_lost_power_together(tight: LockstepRobot) -> None:
+    tight.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
+    for axis in range(8):
+        tight.inject(axis, 1, 0x3220)
+    tight._turn_until(lambda: tight.loop.busy, 3.0, "a reaction")
+    tight._turn_until(lambda: not tight.loop.busy, 60.0, "the power off")
+    assert tight.state is LoopState.FAULT
+    tight.command("acknowledge")
+    tight.enable()
+    with pytest.raises(Refused, match="It has come down, may have turned over"):
+        tight.program("tighten")

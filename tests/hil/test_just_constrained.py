@@ -8,7 +8,7 @@ import pytest
 
 from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.robot import Error
-from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 
 
@@ -19,7 +19,7 @@ def plotter(tmp_path: Path) -> Path:
 
 def test_a_cable_that_is_cut_is_reported_as_broken(plotter: Path) -> None:
     """The estimated tension falls from 25 N to winch friction, four times the slack threshold."""
-    with LockstepRobot(plotter) as robot:
+    with local_robot(plotter) as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[0.2, 1.3])
@@ -51,13 +51,13 @@ motor.cogging = [
 ]
 """
     )
-    with LockstepRobot(plotter, plant=plant) as robot:
+    with local_robot(plotter, plant=plant) as robot:
         robot.enable()
         with pytest.raises(Error, match=r"c1: came in by .* take up slack by hand"):
             robot.carry_out("tighten")
     plant.write_text(
         "seed = 100\nmotor.friction.coulomb_Nm = 0.16\nstart.slack_m = [0.016, 0.035]\n"
     )
-    with LockstepRobot(plotter, plant=plant) as robot:
+    with local_robot(plotter, plant=plant) as robot:
         robot.enable()
         robot.carry_out("tighten")

@@ -11,8 +11,8 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.diagnosis.predictions import SWING_S, CableLoss
 from cdpr_rt.diagnosis.subject import Subject
-from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.pose_log import read_pose_log
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 
 CUT = 12
@@ -35,7 +35,7 @@ def test_a_platform_swings_as_fast_and_as_far_as_predicted(
 ) -> None:
     slower = slower_robot(tmp_path, robot)
     predicted = CableLoss(Subject(load_robot(slower))).swing(cable, place_m)
-    with LockstepRobot(slower) as rig:
+    with local_robot(slower) as rig:
         rig.enable()
         rig.carry_out("tighten")
         rig.carry_out("pose", position_m=list(place_m))

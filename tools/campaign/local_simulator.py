@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import socket
+import stat
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from itertools import count
@@ -140,14 +141,12 @@ class LocalSimulator(RobotSimulator):
         for hub in self.hubs:
             hub.turn(0.0)
         for descriptor in _descriptors():
-            try:
+            if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
                 with socket.socket(fileno=os.dup(descriptor)) as sock:
                     locked = sock.family == socket.AF_UNIX and sock.getsockname()
-            except OSError:  # no socket
-                continue
-            if isinstance(locked, bytes) and locked.startswith(_MASTER):
-                with socket.socket(socket.AF_UNIX) as unbound:
-                    os.dup2(unbound.fileno(), descriptor, inheritable=False)
+                if isinstance(locked, bytes) and locked.startswith(_MASTER):
+                    with socket.socket(socket.AF_UNIX) as unbound:
+                        os.dup2(unbound.fileno(), descriptor, inheritable=False)
 
     def after_fork(self, folder: Path) -> None:
         """Stop sharing sockets and files with the process that has forked; use `folder` from now.
