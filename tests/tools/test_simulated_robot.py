@@ -23,8 +23,8 @@ from cdpr_tools.lockstep_robot import LockstepRobot
 
 
 @pytest.fixture(scope="module")
-def robot() -> Iterator[cdpr.Robot]:
-    with cdpr.simulate("planar-3") as opened:
+def robot(planar_file: Path) -> Iterator[cdpr.Robot]:
+    with cdpr.simulate(planar_file) as opened:
         opened.enable()
         opened.tighten()
         opened.move_to([0.0, 1.8])
@@ -212,12 +212,12 @@ def test_wait_runs_exactly_the_requested_time(
     begun_s = robot.time_s
     robot.wait(1.0)
     assert len(passes) == 10
-    robot.wait(0.25)
-    assert robot.time_s - begun_s == pytest.approx(1.25)
+    robot.wait(0.24)
+    assert robot.time_s - begun_s == pytest.approx(1.24)
 
 
-def test_a_drive_fault_ends_a_move_and_can_be_acknowledged() -> None:
-    with cdpr.simulate("planar-3") as robot:
+def test_a_drive_fault_ends_a_move_and_can_be_acknowledged(planar_file: Path) -> None:
+    with cdpr.simulate(planar_file) as robot:
         with pytest.raises(cdpr.Refused, match=r"call enable\(\) first") as refused:
             robot.move_to([0.0, 1.8])
         assert refused.value.code is RefusalCode.NOT_IN_STATE

@@ -13,6 +13,7 @@ from cdpr_rt.core.states import LoopState
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.slower_robot import slower_robot
 from tests.tools.daemon.loop_rig import opened
 from tests.tools.motor_profiles import cogging_Nm, leave_profiles
 from tests.tools.robot_rig import robot_file, simulated
@@ -22,7 +23,8 @@ pytestmark = pytest.mark.long
 SPEED_m_s = 0.01
 """22 deg/s at the motors."""
 _Compensated = tuple[LockstepRobot, np.ndarray, tuple[float, float]]
-FADE_IN_CYCLES = 200
+PERIOD_S = 2e-3
+FADE_IN_CYCLES = 100
 MOST_Nm = 0.25
 """An upper bound of cogging plus friction of these motors."""
 WORSE = """
@@ -66,8 +68,13 @@ def _motors(path: Path) -> list[Plant]:
 
 
 @pytest.fixture(scope="module")
-def learnt(plant: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return leave_profiles(load_robot("planar-3"), _motors(plant), tmp_path_factory.mktemp("learnt"))
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return slower_robot(tmp_path_factory.mktemp("planar"), "planar-3", PERIOD_S)
+
+
+@pytest.fixture(scope="module")
+def learnt(plant: Path, planar: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return leave_profiles(load_robot(planar), _motors(plant), tmp_path_factory.mktemp("learnt"))
 
 
 def _wandering_mm(robot: LockstepRobot) -> tuple[float, float]:
@@ -81,7 +88,7 @@ def _wandering_mm(robot: LockstepRobot) -> tuple[float, float]:
     robot.run(1.0)
     off, mistaken = [], []
     for _ in range(500):
-        robot.turn(10)
+        robot.turn(5)
         here = robot.truth()["position_m"][:2]
         off.append(here - robot.row["pose_setpoint"][:2])
         mistaken.append(here - robot.row["pose"][:2])
@@ -91,8 +98,8 @@ def _wandering_mm(robot: LockstepRobot) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module")
-def compensated(plant: Path, learnt: Path) -> Iterator[_Compensated]:
-    with LockstepRobot("planar-3", plant=plant, commissioned=learnt) as robot:
+def compensated(plant: Path, planar: Path, learnt: Path) -> Iterator[_Compensated]:
+    with LockstepRobot(planar, plant=plant, commissioned=learnt) as robot:
         robot.enable()
         robot.program("tighten")
         robot.finish()
@@ -130,9 +137,9 @@ def test_each_motor_is_compensated_at_its_angle(compensated: _Compensated, plant
 
 
 def test_compensation_smooths_motion_and_improves_the_known_position(
-    compensated: _Compensated, plant: Path
+    compensated: _Compensated, plant: Path, planar: Path
 ) -> None:
-    with LockstepRobot("planar-3", plant=plant, learns=False) as robot:
+    with LockstepRobot(planar, plant=plant, learns=False) as robot:
         robot.enable()
         robot.carry_out("tighten")
         without_mm, mistaken_mm = _wandering_mm(robot)
@@ -147,7 +154,7 @@ def test_compensation_smooths_motion_and_improves_the_known_position(
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
     """Yield two commissioned motors without load."""
     folder = tmp_path_factory.mktemp("pair")
-    path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=2e-3)
+    path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=PERIOD_S)
     leave_profiles(load_robot(path), [Plant()] * 2, folder)
     text = path.read_text()
     for i in range(2):
