@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import pty
-import select
 import signal
 import subprocess
 import sys
-import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 
@@ -18,9 +15,7 @@ import pytest
 from daemon_lab import KEY, with_key
 from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until, write_robot
 
-from cdpr_profiles.places import SHIPPED
 from cdpr_tools.bench.flood import Target
-from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.daemon.loop_file import LoopFile
 
 RUN = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run"]
@@ -79,81 +74,6 @@ def test_a_daemon_whose_output_is_closed_restarts_its_service(
     finally:
         daemon.process.kill()
         daemon.process.wait()
-
-
-def on_terminal(*words: str) -> tuple[subprocess.Popen[bytes], int]:
-    """Start `cdpr run` on a new terminal. Return the process and the other end of the terminal."""
-    ours, theirs = pty.openpty()
-    # a new session with a controlling terminal, so that the process receives SIGHUP
-    become = "import os, sys, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
-    become += "os.execv(sys.argv[1], sys.argv[1:])"
-    process = subprocess.Popen(
-        [sys.executable, "-c", become, *RUN, *words],
-        stdin=theirs, stdout=theirs, stderr=theirs, env={**os.environ, "TERM": "dumb"},
-    )  # fmt: skip
-    os.close(theirs)
-    shown, end_s = b"", time.monotonic() + PATIENCE_S
-    try:
-        while b"Ctrl-C ends it" not in shown:
-            if select.select([ours], [], [], 1.0)[0]:
-                with suppress(OSError):
-                    shown += os.read(ours, 4096)
-            assert process.poll() is None, shown
-            assert time.monotonic() < end_s, shown
-    except BaseException:
-        process.kill()
-        process.wait()
-        raise
-    return process, ours
-
-
-def test_a_daemon_whose_terminal_closes_ends_with_status_0(tmp_path: Path) -> None:
-    at = ("--socket", str(tmp_path / "control.sock"))
-    robot = str(write_robot(tmp_path))
-    process, terminal = on_terminal(robot, "--bus", "simbus:", "--no-record", *at)
-    try:
-        done = cdpr("enable", *at)
-        assert done.returncode == 0, done.stderr
-        os.close(terminal)
-        assert process.wait(PATIENCE_S) == 0
-    finally:
-        process.kill()
-        process.wait()
-    assert not list(tmp_path.glob("control.*"))
-
-
-@pytest.mark.alone
-def test_a_closed_terminal_lowers_a_platform_for_more_than_half_a_minute(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot, at = tmp_path / "planar.toml", ("--socket", str(tmp_path / "control.sock"))
-    text = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    for key, value, instead in (("sync_period_s", 0.001, 0.004), ("\nspeed_m_s", 0.5, 0.02)):
-        assert f"{key} = {value}" in text
-        text = text.replace(f"{key} = {value}", f"{key} = {instead}")
-    robot.write_text(text)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    bus = f"simbus:terminal-{os.getpid()}"
-    simulator = OwnSimulator(
-        str(robot), bus
-    )  # not by the daemon, which keeps the lengths in that case
-    try:
-        process, ours = on_terminal(str(robot), "--bus", bus, *at, "--no-record")
-        try:
-            for words in (("enable",), ("tighten",), ("move", "--to", "0", "1900")):
-                done = cdpr(*words, *at)
-                assert done.returncode == 0, done.stderr
-            os.close(ours)
-            closed_s = time.monotonic()
-            assert process.wait(120) == 0
-            assert time.monotonic() - closed_s > 30.0
-        finally:
-            process.kill()
-            process.wait()
-    finally:
-        simulator.stop()
-    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.simulated.json").read_text())
-    assert (kept["stopped"], kept["fallen"], kept["displaced"]) == (True, False, False)
 
 
 def test_stop_works_while_the_launcher_process_is_stopped(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ def result_of(*words: str) -> Any:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@pytest.mark.alone  # Ray's processes have half a minute of wall-clock time to start
+@pytest.mark.long
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_cluster_gives_the_same_result(command: str, address: str) -> None:
     words = COMMANDS[command]
