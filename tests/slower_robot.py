@@ -16,7 +16,7 @@ def slower_robot(folder: Path, name: str | Path, period_s: float = PERIOD_S) -> 
     return _slower(load_robot(name).path, folder, period_s)
 
 
-def _slower(given: Path, folder: Path, period_s: float = PERIOD_S) -> Path:
+def _slower(given: Path, folder: Path, period_s: float) -> Path:
     key = "sync_period_s = "
     text, count = re.subn(rf"(?m)^{key}\S+", f"{key}{period_s}", given.read_text())
     assert count == 1
@@ -31,10 +31,10 @@ def slower_profiles(config: Path) -> None:
     `config` is the value of XDG_CONFIG_HOME.
     """
     own = config / "cdpr-rt" / "profiles"
-    for kind, name in (
-        ("robots", "planar-3"),
-        ("robots", "planar-4"),
-        ("winches", "winch-mpp0923d"),
+    for kind, name, period_s in (
+        ("robots", "planar-3", PERIOD_S),
+        ("robots", "planar-4", PERIOD_S),
+        ("winches", "winch-mpp0923d", 0.5 * PERIOD_S),  # its commissioning needs a stiffer loop
     ):
         (own / kind).mkdir(parents=True, exist_ok=True)
-        _slower(SHIPPED / kind / f"{name}.toml", own / kind)
+        _slower(SHIPPED / kind / f"{name}.toml", own / kind, period_s)

@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from tests.slower_robot import slower_profiles
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MOST_LINES = 60
 PRINTED = {
@@ -41,6 +43,14 @@ NEEDED = {"gym_environment.py": "gymnasium"}
 NOTEBOOK = EXAMPLES / "live_plot.ipynb"
 
 
+@pytest.fixture(scope="module")
+def slower(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Return the environment of a user with profiles of the same names and longer cycles."""
+    config = tmp_path_factory.mktemp("config")
+    slower_profiles(config)
+    return {"XDG_CONFIG_HOME": str(config)}
+
+
 def test_each_example_is_listed_and_has_at_most_60_lines() -> None:
     files = {path.name: path.read_text().count("\n") for path in EXAMPLES.glob("*.py")}
     assert files.keys() == PRINTED.keys()
@@ -53,13 +63,20 @@ def test_each_example_is_listed_and_has_at_most_60_lines() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PRINTED)
-def test_example_succeeds_and_prints_its_results(name: str, tmp_path: Path) -> None:
+def test_example_succeeds_and_prints_its_results(
+    name: str, slower: dict[str, str], tmp_path: Path
+) -> None:
     if name in NEEDED:
         pytest.importorskip(NEEDED[name])
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name)],
         cwd=tmp_path,
-        env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "XDG_STATE_HOME": str(tmp_path)},
+        env={
+            **os.environ,
+            **slower,
+            "XDG_RUNTIME_DIR": str(tmp_path),
+            "XDG_STATE_HOME": str(tmp_path),
+        },
         capture_output=True,
         text=True,
         timeout=300.0,

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
 import numpy as np
 import pytest
 
 import cdpr_rt as cdpr
+from tests.slower_robot import slower_robot
 
 
 @pytest.mark.parametrize(
@@ -56,11 +57,21 @@ def test_commission_in_another_thread_is_rejected_because_ctrl_c_must_stop_it(
 
 @pytest.mark.long
 def test_ctrl_c_ends_a_commissioning_and_has_its_usual_effect_afterwards(tmp_path: Path) -> None:
-    pressed = Timer(8.0, os.kill, (os.getpid(), signal.SIGINT))
+    over = threading.Event()
+
+    def press() -> None:
+        while not list(tmp_path.rglob("*.raw")) and not over.wait(0.05):
+            pass
+        os.kill(os.getpid(), signal.SIGINT)
+
+    pressed = threading.Thread(target=press)
     pressed.start()
-    with pytest.raises(KeyboardInterrupt, match="stopped"):
-        cdpr.commission("winch-mpp0923d", bus="simbus:", folder=tmp_path, quick=True)
-    pressed.join()
+    try:
+        with pytest.raises(KeyboardInterrupt, match="stopped"):
+            cdpr.commission("winch-mpp0923d", bus="simbus:", folder=tmp_path, quick=True)
+    finally:
+        over.set()
+        pressed.join()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -77,7 +88,7 @@ def test_poses_of_a_failed_calibration_are_kept_and_continued_only_on_request(
     def broken(_by_cables_m: np.ndarray) -> None:
         raise OSError("the tracker does not answer")
 
-    with cdpr.simulate("planar-4") as robot:
+    with cdpr.simulate(slower_robot(tmp_path, "planar-4")) as robot:
         robot.enable()
         with pytest.raises(cdpr.Error, match="the cables do not hold the platform"):
             cdpr.calibrate(robot, poses=15, folder=folder)

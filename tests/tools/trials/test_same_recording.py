@@ -7,6 +7,7 @@ import pytest
 from mcap.reader import make_reader
 
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.slower_robot import slower_robot
 
 pytestmark = pytest.mark.long
 
@@ -15,7 +16,8 @@ COMPARED = ("/cycle", "/description", "/events", "/status")
 
 def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
     """Tighten the cables with pauses in wall-clock time. Return messages by topic."""
-    with LockstepRobot("planar-3", record=folder) as robot:
+    robot_file = slower_robot(folder.parent, "planar-3")
+    with LockstepRobot(robot_file, record=folder) as robot:
         robot.enable()
         for name in ("hold", "tighten") * 3:
             robot.program(name)
