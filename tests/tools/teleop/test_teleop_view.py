@@ -20,14 +20,23 @@ from cdpr_tools.teleop import view as view_module
 from cdpr_tools.teleop.input_device import InputSample
 from cdpr_tools.teleop.script import ScriptDevice, ScriptLine
 from cdpr_tools.teleop.session import TeleopSession
-from cdpr_tools.teleop.view import View
+from cdpr_tools.teleop.view import Canvas, View
 
+PLATFORM = {
+    "home_m": [0.0, 0.0],
+    "exit_points_m": [[-2.0, 2.0], [2.0, 2.0], [0.0, -2.0]],
+    "anchor_points_m": [[-0.1, 0.1], [0.1, 0.1], [0.0, -0.1]],
+    "workspace_min_m": [-1.0, -1.0],
+    "workspace_max_m": [1.0, 1.0],
+}
 AXES = [{"name": name} for name in ("left", "right", "lower")]
 
 
 def seen(
     pose: tuple[float, ...],
     status: dict[str, Any],
+    platform: dict[str, Any] | None = PLATFORM,
+    height: int = 40,
     before: str = "",
     silent_s: float = 0.0,
     coordinates: int = 2,
@@ -43,21 +52,30 @@ def seen(
         session.hand = InputSample((0.01, 0.0, 0.0), clutch=False, confirmed=2)
         session.round_trips_s.extend((0.35, 0.73))
         session._heard_s -= silent_s
-        view = View(session, {"axes": AXES}, before)
+        view = View(session, {"axes": AXES, "platform": platform}, before)
         view.tell(status)
-        console = Console(width=120, color_system=None)
+        console = Console(width=120, height=height, color_system=None)
         with console.capture() as shown:
             console.print(view)
     return shown.get().splitlines()
 
 
-def test_the_view_shows_robot_target_link_and_tensions() -> None:
+def test_the_picture_shows_robot_and_target_at_their_positions() -> None:
     turn = math.radians(1.5)
     pose = (0.5, 0.5, 0.0, math.cos(turn), 0.0, 0.0, math.sin(turn))
     axes = [{"tension_N": 40.4}, {"tension_N": None}, {"tension_N": 20.0}]
     progress = {"target_m": [-0.5, 0.5], "held_back": "left: 12 N are missing", "stream": "fresh"}
     lines = seen(pose, {"axes": axes, "program_progress": progress, "reason": "a reason"})
     text = "\n".join(lines)
+    picture = lines[:22]
+    assert sum(line.count("◉") for line in picture) == 3
+    (row_o, column_o), (row_t, column_t) = (
+        next((k, line.index(mark)) for k, line in enumerate(picture) if mark in line)
+        for mark in "o+"
+    )
+    assert row_o == row_t  # same height
+    # 1 m of 4.2 m in 22 rows of 4 dots, with 2 dots per character
+    assert column_o - column_t == pytest.approx(1.0 * 22 * 4 / 4.2 / 2, abs=1.5)
     for told in (
         "LEADS  active, 2 confirmed",
         "platform +500.0 +500.0 mm, +3.00 deg; target -500.0 +500.0 mm",
@@ -78,7 +96,7 @@ def test_stale_values_are_not_shown_as_current(monkeypatch: pytest.MonkeyPatch) 
     assert "held long ago" in "\n".join(seen(pose, status, before="another"))
     monkeypatch.setattr(view_module, "_STALE_S", 0.0)
     assert "left 40" not in "\n".join(seen(pose, status))
-    lines = seen(pose, {}, silent_s=1.2)
+    lines = seen(pose, {}, silent_s=1.2, height=12)
     assert lines[0].startswith("NO ANSWER for 1.2 s")
 
 
@@ -88,17 +106,37 @@ def test_a_slow_simulation_is_shown() -> None:
         assert (slow in seen(UNKNOWN_POSE, {"real_time_factor": factor})) is shown
 
 
-def test_a_robot_without_a_pose_shows_no_position() -> None:
-    lines = seen(UNKNOWN_POSE, {})
+def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
+    pose = (0.5, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0)
+    lines = seen(pose, {}, height=24)
+    assert len(lines) <= 24
+    assert any("◉" in line for line in lines)
+    assert not any("◉" in line for line in seen(pose, {}, height=12))
+
+
+def test_a_robot_without_picture_shows_figures_only() -> None:
+    lines = seen(UNKNOWN_POSE, {}, platform=None)
     assert lines[0].startswith("LEADS")
-    assert not any("platform" in line for line in lines)
+    assert not any("platform" in line or "◉" in line for line in lines)
+
+
+def test_lines_and_marks_are_drawn_at_their_positions() -> None:
+    canvas = Canvas(4, 2, (0.0, 0.0), (7.0, 7.0))
+    canvas.line((0.0, 7.0), (7.0, 7.0))
+    canvas.line((0.0, 0.0), (0.0, 7.0))
+    canvas.line((-1e9, math.nan), (1.0, 1.0))  # not finite: omitted
+    canvas.mark((6.9, 0.1), "x", "red")
+    canvas.mark((70.0, 0.0), "y", "red")
+    rows = ["".join(letters for letters, _ in row) for row in canvas.rows()]
+    assert rows == ["⡏⠉⠉⠉", "⡇  x"]
 
 
 def test_all_coordinates_and_the_rotation_are_shown_in_space() -> None:
     half = math.radians(5.0)
     pose = (0.5, 0.25, 1.5, math.cos(half), 0.0, -math.sin(half), 0.0)
+    room = {"home_m": [0.0, 0.0, 1.0]}
     progress = {"target_m": [0.5, 0.25, 1.6]}
-    lines = seen(pose, {"axes": [], "program_progress": progress}, coordinates=3)
+    lines = seen(pose, {"axes": [], "program_progress": progress}, room, coordinates=3)
     assert any(
         "platform +500.0 +250.0 +1500.0 mm, +0.00 -10.00 +0.00 deg; target +500.0 +250.0 +1600.0"
         in line
