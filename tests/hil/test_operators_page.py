@@ -131,17 +131,25 @@ def test_a_day_by_clicks_moves_breaks_and_repairs_a_robot(
         daemon.wait_for("ready")
 
 
-def test_the_space_bar_stops_a_motion_that_another_page_leads(
-    daemon: RealDaemon, browser: playwright_api.Browser
+@pytest.mark.parametrize("how", ["space bar", "button", "Enter on the button"])
+def test_a_stop_ends_a_motion_that_another_page_leads(
+    daemon: RealDaemon, browser: playwright_api.Browser, how: str
 ) -> None:
     url = address(daemon)
     with opened(browser, url) as leader, opened(browser, url) as other:
-        make_tight(leader)
-        send_to(leader, "-400", "2300")
+        if daemon.status()["state"] != "active":
+            make_tight(leader)
+        end_m = 2.3 if position_m(daemon)[1] < 1.9 else 1.5
+        send_to(leader, "-400", f"{1e3 * end_m:g}")
         see(other, "Moving")
-        other.keyboard.press("Space")
+        if how == "space bar":
+            other.keyboard.press("Space")
+        elif how == "button":
+            other.get_by_role("button", name="Stop").click()
+        else:
+            other.get_by_role("button", name="Stop").press("Enter")
         until(lambda: daemon.status()["program"] == "hold")
-        assert position_m(daemon)[1] < 2.25
+        assert abs(position_m(daemon)[1] - end_m) > 0.05
         other.get_by_text("has the right to move").first.wait_for()
         assert other.get_by_role("button", name="Go").is_disabled()
 

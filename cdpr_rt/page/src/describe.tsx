@@ -267,8 +267,8 @@ function File({ shown, answers }: { shown: Described; answers: Answers }) {
         <button disabled={!valid} onClick={download}>Download</button>
       </div>
       {!shown.writable && <p class="busy">The daemon cannot write into {shown.folder}. Download the file.</p>}
-      {exists && <p class="busy" role="alert">A file of this name exists. <button onClick={() => void save(true)}>Replace it</button></p>}
-      {saved && <p class="on" role="status">Saved. Try it: <code>cdpr run {name} --bus simbus: --open</code></p>}
+      {exists && <p class="busy" role="alert" ref={(text) => text?.scrollIntoView({ block: "nearest" })}>A file of this name exists. <button onClick={() => void save(true)}>Replace it</button></p>}
+      {saved && <p class="on" role="status" ref={(text) => text?.scrollIntoView({ block: "nearest" })}>Saved. Try it: <code>cdpr run {name} --bus simbus: --open</code></p>}
       <details><summary>Show the file</summary><pre tabIndex={0}>{toml}</pre></details>
     </section>
   );

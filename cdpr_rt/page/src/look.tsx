@@ -27,6 +27,7 @@ export function RobotView() {
     try {
       scene.current = new RobotScene(host.current!);
     } catch {
+      host.current!.classList.add("undrawn");
       host.current!.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
     }
     return () => scene.current?.close();
@@ -186,7 +187,7 @@ const STATES: Record<string, string> = {
 export function EventLine({ event: { kind, time, text, times }, exact = false }: { event: DaemonEvent; exact?: boolean }) {
   return (
     <li class={kind === "reason" ? "reason" : ""}>
-      <time>{exact ? time.slice(0, 23).replace("T", " ") : time.slice(11, 19)}</time> {kind === "state" ? STATES[text] ?? text : text}{times > 1 ? ` (${times} times)` : ""}
+      <time>{exact ? time.slice(0, 23).replace("T", " ") : time.slice(11, 19)}</time> {kind === "state" ? STATES[text] ?? text : text.replace(/^pose by/, "move by")}{times > 1 ? ` (${times} times)` : ""}
     </li>
   );
 }

@@ -20,7 +20,7 @@ const plainName = (name: string): string => {
   return `${stem || "path"}${name.slice(dot).toLowerCase()}`;
 };
 
-export const clock = (seconds: number): string => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")} min`;
+const clock = (seconds: number): string => seconds < 60 ? `${seconds.toFixed(0)} s` : `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")} min`;
 
 const lengthText = (length_m: number): string => `${length_m.toFixed(length_m < 10 ? 2 : 1)} m`;
 

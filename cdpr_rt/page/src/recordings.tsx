@@ -52,12 +52,17 @@ export function Recordings() {
 
 function Row({ one }: { one: RecordingFile }) {
   const path = `/recordings/${encodeURIComponent(one.name)}` as const;
-  const save = (kind: "" | "/table.csv" | "/picture.png") => (): void => void store.attempt(() => download(`${path}${kind}`));
+  const [asked, setAsked] = useState(false);
+  const save = (kind: "" | "/table.csv" | "/picture.png") => (): void => {
+    setAsked(kind !== "");
+    void store.attempt(() => download(`${path}${kind}`));
+  };
   return (
     <li>
       <div>
         <strong>{began(one)}</strong> {one.live && <span class="live">being recorded</span>}
         <small>{timeOf(one.duration_s)}, {sizeOf(one.bytes)}, <code>{one.name}</code></small>
+        {asked && <small role="status">The daemon reads the recording. Then the browser saves the file.</small>}
       </div>
       <div class="row" role="group" aria-label={one.name}>
         <a class="button" href={linkTo("scope", { file: one.name })}>Plot</a>

@@ -31,7 +31,11 @@ class Store {
     follow({
       description: (value) => this.change({ description: value.axes ? value : null }), // empty while the loop starts
       status: (value) => this.#look(value),
-      event: (value) => this.change({ events: [value, ...this.events.filter((one) => one.number !== value.number)].slice(0, KEPT_EVENTS) }),
+      event: (value) => {
+        const isRepeated = (one: DaemonEvent, place: number): boolean => place === 0 && value.times > 1 && one.text === value.text;
+        const others = this.events.filter((one, place) => one.number !== value.number && !isRepeated(one, place));
+        this.change({ events: [value, ...others].slice(0, KEPT_EVENTS) });
+      },
       cycle: (value) => this.#keep(value),
       connected: (value) => {
         if (value === this.connected && value) return;

@@ -135,22 +135,24 @@ def test_a_client_that_answers_no_ping_is_dropped_without_a_traceback(
 
 
 def test_only_the_client_that_does_not_read_is_dropped(rig: Rig) -> None:
+    dropped = rig.service.counts["slow_clients_dropped"]
     asleep = socket.create_connection(("127.0.0.1", rig.port))
     asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     asleep.sendall(
-        b"GET /live?rate_Hz=50 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"GET /live?rate_Hz=50&all_cycles=true HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
         b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
         deadline = time.monotonic() + 300.0
         wait_for(lambda: rig.service.counts["live_clients"] == 2)
-        while rig.service.counts["live_clients"] == 2:  # nor does it answer pings
+        while rig.service.counts["live_clients"] == 2:
             connection.recv(60.0)
             assert time.monotonic() < deadline
         json.loads(connection.recv(60.0))
     asleep.close()
     wait_for(lambda: rig.service.counts["live_clients"] == 0)
+    assert rig.service.counts["slow_clients_dropped"] == dropped + 1  # before a ping was missed
 
 
 def test_a_flood_of_pings_without_reading_ends_the_connection(rig: Rig) -> None:
