@@ -55,6 +55,8 @@ function Guide({ title, children }: { title: string; children: ComponentChildren
 const Met = ({ is, children }: { is: boolean; children: ComponentChildren }) => <li class={is ? "on" : "busy"}>{is ? "✓ " : "○ "}<span>{children}</span></li>;
 
 const AUTO = 0;
+/** The first pose must be this close to home, in each direction; the default of home_tolerance_m. */
+const AT_HOME_m = 0.05;
 const COUNTS = [AUTO, 20, 30, 50, 100];
 
 /** Measure poses, look at the verdict, adopt, check. */
@@ -64,7 +66,9 @@ function Geometry({ job, start }: Props) {
   const [camera, setCamera] = useState(false);
   const platform = description!.platform;
   if (!platform) return <section class="card"><p>This robot has no platform: there is no geometry to calibrate.</p></section>;
-  const tight = status!.state === "active" && progressOf(status!).tight !== false;
+  const { tight: cablesTight, position_m = [] } = progressOf(status!);
+  const isAtHome = position_m.every((one, axis) => Math.abs(one - (platform.home_m[axis] ?? 0)) < AT_HOME_m);
+  const tight = status!.state === "active" && cablesTight !== false && isAtHome;
   const inForce = status!.calibration as { version?: number; date?: string } | null;
   const redundant = description!.axes.length > platform.controlled.length;
   const hasCamera = Boolean(job?.offers["simulated_camera"]);
@@ -75,7 +79,7 @@ function Geometry({ job, start }: Props) {
         <li>
           <h3>Before</h3>
           <ul class="conditions">
-            <Met is={tight}>The platform hangs at home on tight cables. <em>Lower</em> and <em>Tighten</em> bring it there.</Met>
+            <Met is={tight}>The platform is at home on tight cables. <em>Lower</em> and <em>Tighten</em> bring it there.</Met>
             <Met is={!inForce}>The robot runs with the geometry of its file.{inForce && ` Now calibration ${inForce.version ?? ""} is in force: undo it, and start the robot again.`}</Met>
             {!redundant && <Met is={camera}>With one cable for each direction, lengths alone show nothing. A camera or measured points are needed.</Met>}
           </ul>
