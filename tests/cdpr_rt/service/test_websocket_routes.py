@@ -139,8 +139,8 @@ def test_only_the_client_that_does_not_read_is_dropped(rig: Rig) -> None:
     asleep = socket.create_connection(("127.0.0.1", rig.port))
     asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     asleep.sendall(
-        b"GET /live?rate_Hz=50&all_cycles=true HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
-        b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        b"GET /live?rate_Hz=50&all_cycles=true HTTP/1.1\r\nHost: localhost\r\n"
+        b"Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
