@@ -16,7 +16,7 @@ from cdpr_tools.campaign.scenario import Scenario, draw
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import cores, runner
 
-_SEEDS_A_JOB: Final = 25
+_SEEDS_A_JOB: Final = 40
 _EVERY: Final = 20
 """One seed in so many runs twice."""
 
@@ -45,7 +45,7 @@ def run(
     Some seeds run twice, each from a separate start, and must give the same bytes.
     """
     jobs = list(_jobs(scenarios))
-    repeated = [Seeds((one,)) for one in scenarios[::_EVERY]] * (len(scenarios) > 1)
+    repeated = list(_jobs(scenarios[::_EVERY])) * (len(scenarios) > 1)
     found: list[Result] = []
     with runner(min(workers or cores(), len(jobs)), cluster) as run_jobs:
         for done, results in enumerate(run_jobs([*jobs, *repeated]), start=1):

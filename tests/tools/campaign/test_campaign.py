@@ -175,8 +175,9 @@ def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
 
 
 @pytest.mark.long
-def test_thirty_seeds_violate_nothing() -> None:
+@pytest.mark.parametrize(("first", "seeds"), [(60, "40"), (100, "20")])
+def test_sixty_seeds_violate_nothing(first: int, seeds: str) -> None:
     done = cdpr_here(
-        "sim", "campaign", ROBOT, "--from", "30", "--seeds", "30", "--workers", "1", "--json"
+        "sim", "campaign", ROBOT, "--from", str(first), "--seeds", seeds, "--workers", "1", "--json"
     )
     assert done.returncode == 0, done.stdout
