@@ -254,7 +254,7 @@ def causes_are_named(j: Judge) -> Iterator[str]:
     """Without its cause, a fault cannot be repaired."""
     if j.end and j.end["state"] == "fault" and not j.end["reason"]:
         yield "state fault without a reason"
-    if j.played.dead_s is not None or j.played.scenario.start == BEFORE_BOOT:
+    if j.ended or j.played.scenario.start == BEFORE_BOOT:
         return
     named = [fault for fault, _, _ in j.named()]
     for cause in j.causes:
@@ -394,15 +394,10 @@ def judge(played: Played, robot: Robot) -> Result:
 def _outcome(j: Judge, cause: Cause) -> str:
     """Return what became of a fault, for the table."""
     later = [status for status in j.played.statuses if status["at_s"] >= cause.at_s]
-    if not later:
-        return "not noticed"
-    named = any(
-        fault["axis"] == cause.axis or cause.axis in fault["suspects"]
-        for status in later
-        for fault in status["faults"] or ()
-    )
-    reactions = {str(status["reacting"]) for status in later} - {"none"}
-    if not reactions and not any(status["state"] == "fault" for status in later):
-        return "named" if named else "not noticed"
+    faults = [fault for status in later for fault in status["faults"] or ()]
+    if not faults:
+        unbooted = any(s["state"] in ("unconfigured", "inactive") and s["reason"] for s in later)
+        return "boot failed" if unbooted else "not noticed"
     ended = "fell" if j.fall_m() > _FELL_m else "stopped"
+    named = any(cause.axis in (fault["axis"], *fault["suspects"]) for fault in faults)
     return f"{ended}, {'named' if named else 'another cause'}"
