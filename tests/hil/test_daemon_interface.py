@@ -71,7 +71,7 @@ def description(daemon: RealDaemon) -> Any:
     return schemathesis.openapi.from_dict(described)
 
 
-FUZZED = settings(max_examples=8, suppress_health_check=list(HealthCheck))
+FUZZED = settings(max_examples=5, suppress_health_check=list(HealthCheck))
 
 
 def resident_B(pid: int) -> int:
