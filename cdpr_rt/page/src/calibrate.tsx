@@ -54,6 +54,7 @@ function Guide({ title, children }: { title: string; children: ComponentChildren
 
 const Met = ({ is, children }: { is: boolean; children: ComponentChildren }) => <li class={is ? "on" : "busy"}>{is ? "✓ " : "○ "}<span>{children}</span></li>;
 
+const GRAVITY_m_s2 = 9.81;
 const AUTO = 0;
 /** The first pose must be this close to home, in each direction; the default of home_tolerance_m. */
 const AT_HOME_m = 0.05;
@@ -114,7 +115,9 @@ function Tension({ job, start }: Props) {
   const { description } = useStore();
   const names = description!.axes.map(({ name }) => name);
   const [axis, setAxis] = useState(names[0] ?? "");
-  const [typed, setTyped] = useState("2, 5, 10");
+  const most_N = description!.limits.tension_max_N[Math.max(0, names.indexOf(axis))] ?? Infinity;
+  const [entered, setTyped] = useState<string | null>(null);
+  const typed = entered ?? [0.2, 0.5, 1].map((share) => (share * Math.min(10, (0.9 * most_N) / GRAVITY_m_s2)).toPrecision(2)).map(Number).join(", ");
   const masses = typed.split(",").map(Number);
   const valid = masses.length >= 3 && masses.every((one) => one >= 0.05 && one <= 1000);
   const command = `cdpr tension calibrate WINCH --masses ${masses.join(",")} --bus URL`;
