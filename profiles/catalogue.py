@@ -69,7 +69,7 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     eds = path.parent / drive.eds
     if not is_file(eds):
         raise ProfileError(
-            path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this one"
+            path, "eds", f"no file {str(drive.eds)!r} beside this one; copy it there"
         )
     return drive.model_copy(update={"eds": resolved(eds)})
 

@@ -149,7 +149,7 @@ class TensionSensors(Profile):
             require_unique(f"sensors: {key}", [getattr(sensor, key) for sensor in self.sensors])
         tilt = self.inclinometer
         if (self.amplifier is None) is not (not self.sensors):
-            raise ValueError("amplifier and sensors: allowed: both or none")
+            raise ValueError("amplifier and sensors: give both or neither")
         if self.amplifier is None and tilt is None:
             raise ValueError("amplifier: is missing; omit it only if there is an inclinometer")
         if tilt is not None and tilt.unit in [sensor.unit for sensor in self.sensors]:

@@ -335,9 +335,9 @@ class PoseReading(Profile):
     @model_validator(mode="after")
     def _measured_wholly(self) -> PoseReading:
         if (self.position_m is None) != (self.position_std_m is None):
-            raise ValueError("position_m and position_std_m: allowed: both or none")
+            raise ValueError("position_m and position_std_m: give both or neither")
         if (self.rotation is None) != (self.rotation_std_rad is None):
-            raise ValueError("rotation and rotation_std_rad: allowed: both or none")
+            raise ValueError("rotation and rotation_std_rad: give both or neither")
         if self.position_m is not None and len(self.position_m) != 3:
             raise ValueError(f"position_m: value {value_text(self.position_m)}; allowed: 3 numbers")
         if self.rotation is not None:

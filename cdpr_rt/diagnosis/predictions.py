@@ -1,7 +1,7 @@
-"""Predictions of a platform's swing: after a loss, on its cables, and if it turns freely.
+"""Predict how a platform moves after a failure or a slip, and its natural frequencies.
 
-They are simulated, because an equilibrium does not show the motion: motors yield to more than
-their torque, and the remaining winches then lower the platform.
+Motions after a failure are simulated, because an equilibrium does not show them: overloaded motors
+yield, and the remaining winches then lower the platform.
 """
 
 from __future__ import annotations
@@ -399,7 +399,7 @@ class CableLoss:
         self._ground_m = self._lowest_m(model.home_pose.array)
 
     def swing(self, cable: int, position_m: tuple[float, ...], loss: Loss = Loss.CABLE) -> Swing:
-        """Return the platform's motion at a position after the loss of a cable, counted from 0."""
+        """Return the platform's motion at a position after the loss of a cable (from 0)."""
         start = self._model.pose(np.array(position_m))
         up, first = self._model.positions - 1, slice(math.ceil(SWING_S / self._period_s))
         largest = np.zeros(6)

@@ -329,7 +329,7 @@ class _Reader:
             if code in _MODES:
                 setattr(state, *_MODES[code])
         if state.plane != "G17" and self._k < 3:
-            raise _LineError(f"{state.plane}: the robot moves in one plane: G17")
+            raise _LineError(f"{state.plane}: the robot moves in a plane; use G17")
         if state.inverse_time != inverse_time:
             state.feed = math.nan
         if "F" in words:
@@ -439,7 +439,7 @@ class _Reader:
         target = self._target_in_room(words) if in_room else self._target(words)
         arc = self._arc(words, target) if motion in ("G2", "G3") else None
         if self._path is None and arc is not None:
-            raise _LineError(f"{motion}: {self._missing()} not given before")
+            raise _LineError(f"{motion}: {self._missing()} unknown; move there first")
         self._append(block.line, target, motion, arc)
 
     def _append(self, line: int, target: FloatArray, motion: str, arc: Arc | None = None) -> None:
@@ -522,7 +522,7 @@ class _Reader:
                 f"{motion}: allowed only in the plane of X and Y (G17) of a robot with Z"
             )
         if self._path is None:
-            raise _LineError(f"{motion}: {self._missing() or 'a position'} not given before")
+            raise _LineError(f"{motion}: {self._missing() or 'position'} unknown; move there first")
         for letter in "ZRPQ":
             if letter in words:
                 unit = 1.0 if letter == "P" else state.unit_m
@@ -586,7 +586,7 @@ class _Reader:
 
     def _dwell(self, block: Block, words: dict[str, float]) -> None:
         if _AXES & set(words):
-            raise _LineError("G4: allowed: P or S, without axes")
+            raise _LineError("G4: give P or S, and no axes")
         seconds = words.pop("S", math.nan)  # used by 3D printers
         if "P" in words:
             seconds = words.pop("P") * self._settings.dwell_unit_s

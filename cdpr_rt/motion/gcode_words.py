@@ -143,7 +143,7 @@ def blocks(text: str, findings: Findings, ignored: frozenset[str] = frozenset())
     percents = 0
     for number, full in enumerate(_LINE_END.split(text.removeprefix("\ufeff")), 1):
         if number > _MOST_LINES:
-            findings.refuse(number, f"the file has more lines than {_MOST_LINES}: divide it")
+            findings.refuse(number, f"the file has more than {_MOST_LINES} lines; divide it")
             return
         if len(full) > _MOST_CHARS:
             findings.refuse(number, f"the line is longer than {_MOST_CHARS} characters")
@@ -219,7 +219,7 @@ def _is_skipped(line: str, number: int, findings: Findings, ignored: frozenset[s
         return False
     if other := _CODE.search(line, first.end()):
         code = line[other.start() :].split(maxsplit=1)[0]
-        findings.refuse(number, f"{name} and {code[:8]} are on one line: divide it")
+        findings.refuse(number, f"{name} and {code[:8]} are on one line; split it")
     else:
         findings.ignore(number, f"the line of {name}")
     return True
@@ -283,7 +283,7 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
             findings.ignore(number, name)
             alone = name if name in _ALONE else alone
         elif name in ignored or name in _IDLE_LINES:
-            findings.refuse(number, f"{name} is on a line with other words: divide it")
+            findings.refuse(number, f"{name} is on a line with other words; split it")
         elif letter in _REPEATED:
             codes.append(name)
         elif letter in words:

@@ -248,10 +248,12 @@ class PathPlanner:
         return middle
 
     def _too_long(self, path: PathDescription, i: int, seconds: float) -> PathError:
-        takes = f"takes {seconds / 60.0:.3g} min or more" if math.isfinite(seconds) else "is long"
+        takes = (
+            f"takes {seconds / 60.0:.3g} min or more" if math.isfinite(seconds) else "is too long"
+        )
         most = f"{LONGEST_s / 60.0:.3g} min"
         return PathError(
-            path.source, path.moves[i].line, f"{takes}; allowed: up to {most}: divide it"
+            path.source, path.moves[i].line, f"{takes}; divide it into parts of up to {most}"
         )
 
     def _least_s(self, nodes: PathNodes) -> float:

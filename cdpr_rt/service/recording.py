@@ -201,9 +201,9 @@ _WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_butto
 
 
 class EventDetector:
-    """Finds changes of state, program, reaction and confirmations in rows.
+    """Finds events: changes of state, program, reaction and confirmations in rows.
 
-    In a status it finds reasons, and programs that failed.
+    A status adds the reason of a stop and failed programs.
 
     Clamping is not an event, because it may begin and end in every cycle.
     """

@@ -121,8 +121,8 @@ def _as_machine_error(
 class RobotMachine:
     """All axes of `robot` on the buses given with --bus; implements `Machine`.
 
-    Power is possible only while the `safety_io` allows it; by default it is the robot's own, unless
-    all buses are simulated. Tensions are measured if `tension_port` names the port of their
+    Power is possible only while the `safety_io` allows it. By default it is that of the robot,
+    unless all buses are simulated. Tensions are measured if `tension_port` names the port of their
     sensors. Simulated buses in lockstep run as fast as they can; with `real_time`, no faster than
     wall time.
     If `optional` is set, non-mandatory axes that do not boot are left out.

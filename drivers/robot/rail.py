@@ -111,9 +111,9 @@ def _void_calibration(rail: RailProfile, clock: Clock, why: str) -> None:
 
 def _refuse(rail: RailProfile, conditions: MoveConditions, voided: str = "") -> None:
     if tight := conditions.cables_tight():
-        raise RailError(f"{rail.name}: not moved unless the cables are slack: {tight}{voided}")
+        raise RailError(f"{rail.name}: moves only with slack cables: {tight}{voided}")
     if powered := conditions.powered():
-        raise RailError(f"{rail.name}: not moved while a winch has power: {powered}{voided}")
+        raise RailError(f"{rail.name}: moves only without power at the winches: {powered}{voided}")
 
 
 def _stop_on_request(rail: RailProfile, conditions: MoveConditions, voided: str = _VOIDED) -> None:

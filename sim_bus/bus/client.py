@@ -259,9 +259,9 @@ class LocalNode(Protocol):
     def accepts(self) -> AbstractSet[int] | None:
         """Identifiers (11 bits, or 29 bits with the EFF flag) that the node wants; None for all.
 
-        A node that changes them provides a new set; the bus reads the attribute again after
-        every frame outside the cyclic exchange (anything but SYNC and PDOs) and after `advance`
-        while bus time runs without SYNC.
+        A node that changes them provides a new set. The bus reads the attribute again after each
+        frame that is neither SYNC nor PDO. While bus time runs without SYNC, it also does so after
+        `advance`.
         """
 
     def receive(self, frame: bytes, now: float) -> None:

@@ -44,7 +44,7 @@ class FaultBench:
             drive.fault_injection.noted = self._recorder(i)
 
     def connect(self, hubs: Sequence[Hub]) -> None:
-        """Take orders on these buses, on which the drives are."""
+        """Accept fault commands on the buses of the drives."""
         by_node = {id(node): hub for hub in hubs for node in hub.nodes}
         self._hubs = [by_node[id(drive)] for drive in self._drives]
         for drive, hub in zip(self._drives, self._hubs, strict=True):

@@ -203,13 +203,14 @@ def paid_out(m: Any) -> tuple[float, float]:
 
 @jit
 def wind(m: Any, h: float, A: float, B: float) -> float:
-    """Return the rotor's new velocity, A·w = B without load, if its cable holds a platform.
+    """Return the new velocity w of a rotor whose cable holds a platform.
 
-    During the step the platform stands still, because it is heavy; the tension found here moves it
-    afterwards. The spring acts at its present length (symplectic Euler), damping is implicit. The
-    compliance of gear and belt adds to the cable's stretch. A hanging cable has the potential
-    energy -w L drop/2. So the platform bears half of its weight, `hung_load`, and at the winch the
-    tension is w drop/2 above that halfway; a cable that is paid out goes down. Creep is a strain
+    Without load A·w = B. During the step the platform stands still, because it is heavy; the
+    tension found here moves it afterwards. The spring acts at its present length (symplectic
+    Euler), damping is implicit. The compliance of gear and belt adds to the cable's stretch. A
+    hanging cable has the potential energy -w L drop/2, with its weight w per length. So the
+    platform bears half of the cable's weight, `hung_load`. At the winch the tension exceeds that
+    in the middle of the cable by w drop/2. Creep is a strain
     that follows a share of the elastic one, d(creep)/dt = (share · t / EA - creep) / time: a chain
     of Kelvin-Voigt elements.
     """

@@ -131,7 +131,11 @@ def test_conditions_of_a_move_are_checked_again_after_a_slow_disk_write(
         assert outcome.exit_code == 0, outcome.exception
         assert abs(moved_m - 0.005) < 5e-4
         return
-    why = f"not moved while a winch has power: node 1 on {bus} is" if meanwhile == "power" else ""
+    why = (
+        f"moves only without power at the winches: node 1 on {bus} is"
+        if meanwhile == "power"
+        else ""
+    )
     said = str(outcome.exception)
     assert (why or "stopped on request") in said
     assert said.endswith("; the robot is no longer calibrated")
@@ -192,7 +196,7 @@ def test_tight_cables_prevent_or_end_a_move(rails: Rails) -> None:
     cells = ("--sensors", "rtu-load-cell-1", "--tension-port", rails.tension_port)
     rails.pull(40.0)
     error = rails.refused("cia402", before + 0.3, *cells)
-    assert "not moved unless the cables are slack: winch 1 has 4" in error
+    assert "moves only with slack cables: winch 1 has 4" in error
     assert "(5 N allowed)" in error
     assert abs(rails.position_m("cia402") - before) < 1e-4
     assert rails.calibration()["calibrated"] is True
@@ -218,7 +222,7 @@ def test_a_winch_with_power_prevents_or_ends_a_move(rails: Rails) -> None:
         assert rails.position_m("modbus") < before + 0.4
         before = rails.position_m("modbus")
         error = rails.refused("modbus", before + 0.1, *slack)
-        assert f"not moved while a winch has power: node 1 on {bus} is" in error
+        assert f"moves only without power at the winches: node 1 on {bus} is" in error
         assert rails.position_m("modbus") == before
 
 

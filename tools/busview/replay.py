@@ -193,9 +193,9 @@ class Pacer:
 
 
 class Sender:
-    """Sends recorded frames to a bus; at the end it cuts the power that they may have switched on.
+    """Sends recorded frames to a bus; at the end it may switch the drives off.
 
-    It requests this if the recording was not sent completely, and always on a real bus.
+    It does so on a real bus, and if it did not send the whole recording.
     """
 
     def __init__(self, url: BusUrl, note: Callable[[str], None]) -> None:

@@ -447,7 +447,7 @@ class _Measuring:
             for text in cover.lines():
                 self._out.note(f"after {len(data.poses)} poses: {text}")
             if not any(len(island) > 1 for island in cover.islands):
-                raise WorkFailedError("no image shows two markers together: put them closer")
+                raise WorkFailedError("no image shows two markers together; move them closer")
         why = criterion(data)
         if why is not None:
             self._out.note(why)

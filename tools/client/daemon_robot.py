@@ -360,7 +360,7 @@ class _Remote:
         return np.array(rows, [(name, dtype[name]) for name in ("time_s", *_OBSERVED)])
 
     def true_pose(self) -> FloatArray:
-        raise Error("true_pose: only of a robot that simulate() has opened")
+        raise Error("true_pose: available only from simulate()")
 
     def plan(self, file: Path) -> str:
         with self._errors():

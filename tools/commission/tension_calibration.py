@@ -417,7 +417,7 @@ def check_masses(winch: Winch, masses_kg: Sequence[float], gravity: float) -> No
     """Raise InvalidRequestError for masses that are too heavy for the motor or not usable."""
     sound = all(math.isfinite(mass) and mass > 0.0 for mass in masses_kg)
     if not sound or len(masses_kg) < LEAST_LEVELS or len(_files(masses_kg)) < len(masses_kg):
-        raise InvalidRequestError("--masses: at least three different masses in kg, as 2,5,10")
+        raise InvalidRequestError("--masses: give at least three different masses in kg: 2,5,10")
     if max(masses_kg) < LEAST_SPAN * min(masses_kg):
         raise InvalidRequestError(
             f"--masses: {min(masses_kg):g} to {max(masses_kg):g} kg; the heaviest must be at least "

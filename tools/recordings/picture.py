@@ -303,7 +303,7 @@ def _draw_pose(ax: Axes, elapsed: FloatArray, curves: Curves, dot: str | None) -
 
 
 def pose_curves(columns: Columns) -> dict[str, Curves]:
-    """Return for each panel the platform's coordinates that move, each with its set-point, (c,).
+    """Return the platform's moving coordinates and their set-points, (c,), by panel.
 
     Rotation vectors are relative to the room's axes.
     """

@@ -94,9 +94,9 @@ class TargetLeg:
 def legs(recorded: Recorded) -> list[TargetLeg]:
     """Return all legs of a trial.
 
-    If a target was changed on the way, the set-point still moves. `stop` is where it turns in each
-    direction, perhaps beyond the new target, but no farther than the acceleration limit and the
-    delay of smoothing allow.
+    If a target changes during a motion, the set-point cannot turn immediately. `stop` is its
+    turning point in each direction, perhaps beyond the new target. The acceleration limit and the
+    delay of smoothing bound it.
     """
     acceleration, found = recorded.directions.acceleration, []
     for mark, rows in _legs(recorded):

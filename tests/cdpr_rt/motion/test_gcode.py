@@ -125,7 +125,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
         (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
         (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: allowed: numbers without exponent"),
-        (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: allowed: P or S, without axes"),
+        (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: give P or S, and no axes"),
         (["G0 X0 Y0 Z0", "G80", "X5"], ROOM, r":3: .* without a motion after G80"),
         (["G0 X0 Y0 Z0", "F60 G93", "G1 X5"], ROOM, r":3: G1 without a feed; .* in the same line"),
         (["G0 X0 Y0 Z0", "G55 X5"], ROOM, r":2: G55: its zero is unknown; give --origin"),
@@ -144,7 +144,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "(open"], ROOM, r":2: a comment is not closed"),
         (["G91 X5"], ROOM, r":1: X: a relative move before the position"),
         (["G0 X0 Y0", "Z5"], PLANE, r":2: Z: the robot has no such axis; --ignore Z drops it"),
-        (["G0 X0 Y0", "G18"], PLANE, r":2: G18: the robot moves in one plane"),
+        (["G0 X0 Y0", "G18"], PLANE, r":2: G18: the robot moves in a plane; use G17"),
         (["G0 X0 Y0 Z0", "G4 P-1"], ROOM, r":2: G4: allowed"),
         (["G0 X0 Y0"], ROOM, r"Z is never given; .*: give the height with --z"),
     ],
@@ -213,7 +213,7 @@ def test_ignoring_a_code_or_macro_skips_its_whole_line():
     assert ends_mm(path) == [[5, 0, 0]]
     path = read("G0 X0 Y0 Z0", "Start_Print Z=10", "G0 X5", "M2", ignored={"START_PRINT"})
     assert ends_mm(path) == [[5, 0, 0]]
-    with pytest.raises(PathError, match=r":2: M777 and G1 are on one line: divide it"):
+    with pytest.raises(PathError, match=r":2: M777 and G1 are on one line; split it"):
         read("G0 X0 Y0 Z0", "M777 G1 X5", "M2", ignored={"M777"})
 
 

@@ -189,7 +189,9 @@ def test_a_path_of_a_planar_robot_is_planned_with_tensions(plane):
 
 @pytest.mark.parametrize("lines", [["G1 X100 F0.05"], ["X50", "G4 P3600"]])
 def test_a_move_longer_than_a_plan_is_rejected(planner, lines):
-    with pytest.raises(PathError, match=r":[23]: takes .* min or more; allowed: up to 16.7 min"):
+    with pytest.raises(
+        PathError, match=r":[23]: takes .* min or more; divide it into parts of up to 16.7 min"
+    ):
         planner.plan(gcode(planner, "G0 X0 Y0 Z0", *lines))
 
 

@@ -337,7 +337,7 @@ def test_a_missing_cluster_is_reported() -> None:
     ("given", "named"),
     [
         ({"position_m": (1.2,), "position_std_m": 0.001}, r"value \[1.2\]; allowed: 3 n"),
-        ({"position_m": (1.0, 2.0, 3.0)}, "both or none"),
+        ({"position_m": (1.0, 2.0, 3.0)}, "both or neither"),
         ({"rotation": ((1.0, 0.0), (0.0, 1.0)), "rotation_std_rad": 0.01}, "3 rows"),
         (
             {"rotation": ((2.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)), "rotation_std_rad": 1},
