@@ -149,9 +149,8 @@ class SharedBlock:
         """
         if (machine := platform.machine()) not in _IN_ORDER:
             raise SharedBlockError(
-                f"this machine's processor is {machine}: processes that share memory without a "
-                "lock need one that makes stores visible in order; allowed: "
-                f"{', '.join(_IN_ORDER)}"
+                f"this machine's processor is {machine}; allowed: {', '.join(_IN_ORDER)}, because "
+                "the processes share memory without a lock and need stores to be visible in order"
             )
         size = os.fstat(fd).st_size
         if size < _COUNTERS.itemsize:

@@ -129,7 +129,9 @@ def _raw_log(path: Path, data: bytes | mmap.mmap) -> RawLog:
     except (ProfileError, KeyError, TypeError):
         known, columns = False, []
     if not known or not columns or len(data) < _HEADER_BYTES:
-        raise RawLogError(f"{path}: not a raw log of version {_VERSION}, or cut within its header")
+        raise RawLogError(
+            f"{path}: not a raw log of version {_VERSION}, or its header is truncated"
+        )
     samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:
         raise RawLogError(f"{path}: contains no complete row of measurements")

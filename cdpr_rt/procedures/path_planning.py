@@ -62,7 +62,7 @@ def size_fault(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> 
 
 
 def size_note(path: PathDescription, low_m: FloatArray, high_m: FloatArray) -> str:
-    """Return the likely mistake of units, by the size of a path inside the box, or ""."""
+    """Return a warning about units if a path is very small for the box, else ""."""
     points = path.points[:, : path.coordinates.positions]
     size, room = np.ptp(points, axis=0), high_m - low_m
     if not size.any() or (size > _SMALL * room).any():

@@ -267,7 +267,7 @@ class Service:
                 self.events.add(part.name, f"{part.name}: failed to end: {error}")
 
     def issue_stream_session(self, token: str | None) -> dict[str, Any]:
-        """Give the holder of the right to move a session of the stream, as `models.StreamAccess`.
+        """Open a stream session for the holder of the right to move; see `models.StreamAccess`.
 
         Raises LeaseError, and StreamError if no stream is received.
         """

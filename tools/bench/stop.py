@@ -38,11 +38,11 @@ Ask = Callable[[str], object]
 
 
 def measure(stops: int, out: Output, *, from_page: bool = False) -> Figures:
-    """Stop a daemon with its own simulated robot, which has no power, with and without a flood.
+    """Measure the time from a stop to the loop's answer, with and without a flood of requests.
 
-    Stops go over the loop's socket and over HTTP in turn, each on a new connection. A figure is the
-    time until the loop's answer arrives. `from_page` presses the page's stop button instead. Raises
-    WorkFailedError.
+    The daemon runs its own simulated robot, without power. Stops go over the loop's socket and
+    over HTTP in turn, each on a new connection. `from_page` presses the page's stop button instead.
+    Raises WorkFailedError.
     """
     if from_page:
         return press_stops(stops, out)

@@ -134,7 +134,7 @@ class Judge:
 
     @property
     def ended(self) -> bool:
-        """Whether a user or a dead or stalled loop may have taken the power."""
+        """Whether the power may be off because of a user, or of a dead or stalled loop."""
         return any(name in ("power off", "stall", "die") for name, _ in self.played.done)
 
     def fall_m(self) -> float:

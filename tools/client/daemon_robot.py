@@ -406,7 +406,7 @@ class _Remote:
             if complete or time.monotonic() > deadline:
                 break
         if not complete and self.status()["state"] in ("ready", "active"):
-            raise Error(f"{last}: the recording does not reach the present; is the disk too slow?")
+            raise Error(f"{last}: the recording lags behind the robot; is the disk too slow?")
         return log[list(fields)][log["stamp_ns"] <= until_ns]
 
     def _recorded(self, first: Path, last: Path, fields: Collection[str]) -> Row:

@@ -109,7 +109,7 @@ class Stick(Hand):
             self.confirmed += 1
 
     def advance(self, now_s: float, longest_s: float) -> None:
-        """Advance the hand to `now_s`, at most by the motion of `longest_s` in one call."""
+        """Advance the hand to `now_s`; one call moves it for `longest_s` at most."""
         passed_s = min(now_s - self._before_s, longest_s)
         self._before_s = now_s
         if not self.held or not passed_s > 0.0:
