@@ -652,6 +652,8 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
+        if stuck := self._slack.stuck():
+            return stuck
         if self._source.name == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
             return dragged
         i = int(moved_m.argmax())

@@ -175,7 +175,7 @@ def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("first", "seeds"), [(66, "34"), (100, "20")])
+@pytest.mark.parametrize(("first", "seeds"), [(60, "40"), (100, "20")])
 def test_fixed_seeds_violate_nothing(first: int, seeds: str) -> None:
     done = cdpr_here(
         "sim", "campaign", ROBOT, "--from", str(first), "--seeds", seeds, "--workers", "1", "--json"
