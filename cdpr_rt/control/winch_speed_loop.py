@@ -29,6 +29,12 @@ platform."""
 PUSH_SHARE = 2.0
 """Push that turns a winch outwards against friction, as a multiple of its largest usual
 friction."""
+_USUAL_SHARE, _HURRY, _UNSEEN_S = 0.25, 6.0, 0.01
+"""Share of that push which turns most winches; factor on the integral rate beyond it; time for
+which a winch that does not turn is pushed fully. A rotor whose encoder has failed accelerates
+unseen."""
+GIVEN_UP_m = -np.inf
+"""Length still to be paid out by a winch that was pushed fully without turning."""
 
 
 @jit
@@ -41,6 +47,7 @@ def control_speed(
     cable: FloatArray,
     gain: FloatArray,
     left: FloatArray,
+    unseen: FloatArray,
     push: FloatArray,
     position: FloatArray,
     last: FloatArray,
@@ -63,12 +70,21 @@ def control_speed(
         jumped[i] = fast
         out = cable[i] * speed[i]
         rate = integral_rate
+        if left[i] == GIVEN_UP_m:
+            tension[i] = torque[i] = integral[i] = 0.0
+            continue
         if left[i] > 0.0:
             left[i] -= period * out
+            stands = out < 0.5 * paying_out[i]
+            unseen[i] = unseen[i] + period if stands and tension[i] <= -push[i] < 0.0 else 0.0
+            if unseen[i] > _UNSEEN_S:
+                left[i] = GIVEN_UP_m
         if left[i] > 0.0:
             least = -push[i]
             if cable[i] * integral[i] > 0.0:  # it turns against its friction alone
                 rate = FIXED_END_1_s
+                if stands and tension[i] < -_USUAL_SHARE * push[i]:
+                    rate *= _HURRY
         else:
             # a loose cable must not be wound up ever faster
             least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
@@ -85,7 +101,9 @@ class WinchSpeedLoop:
 
     A slack cable is reeled in at the commanded speed, a tight one pulled with `high_N`; a loaded
     cable is paid out at the commanded speed, held with at most `high_N`. While `left_m` of a cable
-    is above 0, its motor also pays out without a load, against friction of up to `push_N`.
+    is above 0, its motor also pays out without a load, against friction of up to `push_N`. A winch
+    that is pushed so hard and does not turn gets no torque from then on: its encoder may have
+    failed, and its motor would run away.
     Anti-windup by back-calculation.
     """
 
@@ -117,6 +135,7 @@ class WinchSpeedLoop:
         """Commanded tension of the last cycle; negative if the motor pushes outwards."""
         self.speed_rad_s = np.zeros(n)
         """Filtered motor speed."""
+        self._unseen_s = np.zeros(n)
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
         self._kernel = bound_to(self._bind)
@@ -124,6 +143,7 @@ class WinchSpeedLoop:
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
         self._last[:], self._jumped[:] = feedback.position_rad, False
+        self._unseen_s[:] = 0.0
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
 
@@ -137,7 +157,7 @@ class WinchSpeedLoop:
     ) -> Callable[[float, float], None]:
         return bound(
             control_speed, self._period_s, self._weight, self.low_N, self.high_N,
-            self.paying_out_m_s, self._cable, self._gain, self.left_m, self.push_N,
+            self.paying_out_m_s, self._cable, self._gain, self.left_m, self._unseen_s, self.push_N,
             feedback.position_rad, self._last, self._jumped, self.speed_rad_s, self._integral,
             self.tension_N, torque_Nm, then=(0.0, 0.0),
         )  # fmt: skip

@@ -51,7 +51,24 @@ def test_a_slack_cable_is_paid_out_against_friction_up_to_the_push(friction_N: f
     paid_out_m = CABLE_m * feedback.position_rad[0]
     if friction_N > push_N:
         assert paid_out_m == 0.0
-        assert loop.tension_N[0] == -push_N
+        assert loop.tension_N[0] == 0.0
     else:
         assert paid_out_m == pytest.approx(left_m, abs=0.01)
         assert speed_rad_s == 0.0 and loop.tension_N[0] >= 0.0
+
+
+def test_a_motor_whose_encoder_shows_no_motion_does_not_run_away() -> None:
+    """The cable is slack; the motor turns, and its encoder does not count."""
+    loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
+    loop.high_N[:], loop.paying_out_m_s[:] = HIGH_N, 0.15
+    loop.left_m[:], loop.push_N[:] = 2.0, 25.0
+    loop.integral_rate_1_s = HANGING_LOAD_1_s
+    feedback, torque_Nm, speed_rad_s, fastest_rad_s = AxisFeedback(1), np.zeros(1), 0.0, 0.0
+    loop.begin(feedback, np.zeros(1), torque_Nm)
+    for _ in range(1000):
+        moving_Nm = max(torque_Nm[0] - COULOMB_Nm, -COULOMB_Nm)
+        speed_rad_s = max(speed_rad_s + PERIOD_s * moving_Nm / INERTIA_kg_m2, 0.0)
+        fastest_rad_s = max(fastest_rad_s, speed_rad_s)
+        loop.update(feedback, torque_Nm)
+    assert fastest_rad_s < 150.0
+    assert speed_rad_s == torque_Nm[0] == 0.0
