@@ -29,10 +29,10 @@ platform."""
 PUSH_SHARE = 2.0
 """Push that turns a winch outwards against friction, as a multiple of its largest usual
 friction."""
-_USUAL_SHARE, _HURRY, _UNSEEN_S = 0.25, 6.0, 0.01
-"""Share of that push which turns most winches; factor on the integral rate beyond it; time for
-which a winch that does not turn is pushed fully. A rotor whose encoder has failed accelerates
-unseen."""
+_USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.25, 6.0, 0.01, 5
+"""Share of that push which turns most winches, and factor on the integral rate beyond it. Time for
+which a winch that does not turn is pushed fully, plus cycles until its encoder could show a motion.
+A rotor whose encoder has failed accelerates unseen, so they are short."""
 GIVEN_UP_m = -np.inf
 """Length still to be paid out by a winch that was pushed fully without turning."""
 
@@ -77,7 +77,7 @@ def control_speed(
             left[i] -= period * out
             stands = out < 0.5 * paying_out[i]
             unseen[i] = unseen[i] + period if stands and tension[i] <= -push[i] < 0.0 else 0.0
-            if unseen[i] > _UNSEEN_S:
+            if unseen[i] > _UNSEEN_S + _UNSEEN_CYCLES * period:
                 left[i] = GIVEN_UP_m
         if left[i] > 0.0:
             least = -push[i]

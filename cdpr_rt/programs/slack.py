@@ -33,10 +33,10 @@ _RAISED_1_s = 2.0
 sticks."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
 """Slack that a cable keeps until all cables have been tight, and the longest time to pay it out."""
-_HURRY, _UNSEEN_S = 6.0, 0.01
-"""Factor on the speed of paying out a cable whose winch does not turn with its usual friction; time
-for which it may be pushed with the full bound without turning. A rotor whose encoder has failed
-accelerates unseen, so both are short."""
+_HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 6.0, 0.01, 5
+"""Factor on the speed of paying out a cable whose winch does not turn with its usual friction. Time
+for which such a winch is pushed with the full bound, plus cycles until its encoder could show a
+motion. A rotor whose encoder has failed accelerates unseen, so they are short."""
 
 LOOSENED, NEXT, REELED_IN, PAID_OUT, WAITING, CLOSING, TIGHT, STUCK = range(8)
 """Phases of a cable: paid out a little at first; held until its turn; reeled in alone; paid out
@@ -173,7 +173,7 @@ def _paying_out(w: Winches, i: int, phase: int, state: FloatArray, reeled_m: flo
     state[CYCLES] += 1.0
     pushed = w.tension_N[i] <= -PULLED * w.enough_N[i] and not _pays_out(w, i)
     state[UNSEEN] = state[UNSEEN] + 1.0 if pushed else 0.0
-    if state[UNSEEN] * w.period_s > _UNSEEN_S:
+    if state[UNSEEN] > _UNSEEN_S / w.period_s + _UNSEEN_CYCLES:
         return STUCK
     if reeled_m >= -_LEFT_m and state[CYCLES] * w.period_s <= _LEAVE_S:
         return phase

@@ -72,7 +72,7 @@ def test_a_hanging_platform_is_checked_again_after_an_early_end(
         looked.append(parts)
         return False
 
-    monkeypatch.setattr("cdpr_rt.programs.tighten.hangs", hangs)
+    monkeypatch.setattr("cdpr_rt.programs.standing.hangs", hangs)
     handing_over(robot)
     looked.clear()
     robot.program.check({"from": "lengths"})

@@ -290,7 +290,7 @@ def test_no_friction_is_learnt_if_lengths_at_home_disagree(
         type(robot.parts.control.pull_fit), "begin_learning", lambda _: begun.append(True)
     )
     with monkeypatch.context() as elsewhere:
-        elsewhere.setattr(tighten_module, "disagreement", lambda *_: "disagree")
+        elsewhere.setattr("cdpr_rt.programs.standing.disagreement", lambda *_: "disagree")
         robot.switch("tighten", {})
         assert robot.until_done(20.0)["trouble"] == "disagree"
     assert not begun

@@ -202,7 +202,7 @@ def test_a_winch_that_is_pushed_outwards_with_the_full_bound_and_does_not_turn_i
     cable = OneCable()
     cable.enter(kernel.LOOSENED)
     assert cable.run(0.1, -0.9 * ENOUGH_N) == kernel.LOOSENED
-    assert cable.run(0.02, -ENOUGH_N) == kernel.STUCK
+    assert cable.run(0.03, -ENOUGH_N) == kernel.STUCK
     assert cable.winch.low_N[0] == cable.winch.high_N[0] == 0.0
     turns = OneCable()
     turns.enter(kernel.LOOSENED)
