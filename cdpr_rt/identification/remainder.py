@@ -18,7 +18,8 @@ _LEAST_SEEN = 0.05
 """Windows near a sample, as a share of their mean number, for a value there."""
 _BOTH = 0.5
 """Share of the turn that two turns must have in common to be compared."""
-_UNKNOWN_SHARE = 0.5
+_LEAST_SHARE = 0.5
+"""Share of the curve of a single turn, if noise might explain all of it."""
 _LEAST_VARIANCE = 1e-16
 
 
@@ -31,7 +32,8 @@ def remaining_curve(
     turns' curves c_t, weighted with their inverse variance. The linear estimate of least mean
     square error multiplies it by s/mean(c̄²), where s is the mean of c_t c_u over pairs of
     turns: noise does not repeat. If only one turn was recorded, s is unknown. Half of the curve is
-    then the choice whose largest error over all s is least.
+    then the choice whose largest error over all s is least. More of it is kept if independent noise
+    of the windows explains only a small share of it, see `_share_of_one_turn`.
     """
     sums, counts, precision = _turns(windows, used, residual_Nm, lag_rad)
     seen = counts > _LEAST_SEEN * counts.mean(axis=1, keepdims=True)
@@ -40,12 +42,44 @@ def remaining_curve(
     total = weight.sum(axis=0)
     mean = (weight * curves).sum(axis=0) / np.maximum(total, precision.min())
     pairs = total**2 - (weight**2).sum(axis=0)
-    share, common = _UNKNOWN_SHARE, pairs > 0.0
-    if common.mean() > _BOTH:
+    common = pairs > 0.0
+    if common.mean() <= _BOTH:
+        noise = _noise_variance(used, residual_Nm, counts.sum(axis=0)[total > 0.0])
+        share = _share_of_one_turn(noise, float((mean**2).mean()))
+    else:
         products = (weight * curves).sum(axis=0) ** 2 - ((weight * curves) ** 2).sum(axis=0)
         repeated = float(products[common].sum() / pairs[common].sum())
         share = min(max(repeated / max(float((mean[common] ** 2).mean()), 1e-30), 0.0), 1.0)
     return np.asarray(share * (mean - mean.mean()))
+
+
+def _share_of_one_turn(noise: float, variance: float) -> float:
+    """Return the share of a curve of one turn that is used; `noise` is part of its variance.
+
+    A share k of a curve of which the share s repeats has the error s (1 - k)² + (1 - s) k². That is
+    less than 1 - s, the error of the whole curve, if k > 2 s - 1.
+    """
+    most = 1.0 - noise / max(variance, _LEAST_VARIANCE)
+    return min(max(2.0 * most - 1.0, _LEAST_SHARE), 1.0)
+
+
+def _noise_variance(used: Sequence[IntArray], residual_Nm: FloatArray, counts: FloatArray) -> float:
+    """Return the variance of the smoothed curve due to noise that rows do not have in common.
+
+    `counts` are numbers of windows at samples; Gaussian smoothing averages 2 √π σ of them. Windows
+    overlap by half, so that neighbours are correlated with 1/2. White noise of variance v then has
+    second differences of variance 2 v, which hardly contain the curve, and a mean of m rows has the
+    variance 2 v/m.
+    """
+    squares, first = [np.zeros(0)], 0
+    for rows in used:
+        left = residual_Nm[first : first + rows.size]
+        first += rows.size
+        bend = left[2:] - 2.0 * left[1:-1] + left[:-2]
+        squares.append(bend[rows[2:] - rows[:-2] == 2] ** 2)
+    each = float(np.concatenate(squares).sum()) / max(sum(part.size for part in squares), 1)
+    averaged = 2.0 * np.sqrt(np.pi) * _WIDTH * np.maximum(counts, 1e-9)
+    return each * float(np.mean(1.0 / averaged))
 
 
 def _turns(

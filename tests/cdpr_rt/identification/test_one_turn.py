@@ -54,6 +54,25 @@ def test_a_curve_adds_what_many_small_orders_leave(turns: float) -> None:
     assert error < 0.85 * before
 
 
+@pytest.mark.parametrize(
+    ("small_Nm", "most"),
+    [pytest.param(1.5e-3, 0.4, id="curve of small orders"), pytest.param(0.0, 1.5, id="noise")],
+)
+def test_the_curve_of_one_turn_is_nearly_whole_only_if_noise_does_not_explain_it(
+    small_Nm: float, most: float
+) -> None:
+    rng = np.random.default_rng(0)
+    small = [(n, small_Nm * rng.rayleigh(), rng.uniform(0.0, 360.0)) for n in range(1, 60)]
+    terms = ((7, 0.02, 10.0), (28, 0.012, 30.0), *small)
+    plant = TruePlant(terms=terms, coulomb=0.02, breakaway=0.025, kt_error=0.0)
+    found = identified(turn(plant, 20.0))
+    angle = np.linspace(0.0, 2.0 * np.pi, 4000)
+    true = plant.wave(terms, angle)
+    alone = replace(found, remainder_Nm=np.zeros_like(found.remainder_Nm))
+    error, before = (np.std(f.cogging_Nm(angle) - true) for f in (found, alone))
+    assert error < most * before
+
+
 def test_noise_that_does_not_repeat_adds_no_curve() -> None:
     plant = TruePlant(coulomb=0.08, breakaway=0.085, noise=2.0, kt_error=0.0)
     found = identified(*(turn(plant, speed, 3.03) for speed in (20.0, -20.0)))
