@@ -375,6 +375,12 @@ def test_a_drive_whose_pdo_maps_cannot_contain_torque_is_rejected(tmp_path: Path
     told = refused(with_key("6071", "PDOMapping", "0", text), tmp_path)
     assert "RPDO: no RPDO can carry 6040h, 6071h" in told
     assert "[6071] PDOMapping is not 1" in told
+    fixed = with_key("6071", "PDOMapping", "0", text)
+    for number in range(4):
+        fixed = with_key(f"140{number}sub2", "AccessType", "ro", fixed)
+    told = refused(fixed, tmp_path)
+    assert "[1403sub2] AccessType does not let transmission type 1 (every SYNC) be written" in told
+    assert "; [6071] PDOMapping is not 1" in told
     for number in range(4):
         text = with_key(f"160{number}sub0", "AccessType", "ro", text)
     assert "the maps are fixed" in refused(text, tmp_path)

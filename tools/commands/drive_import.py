@@ -38,6 +38,7 @@ _BITS = {
 _HARMLESS = (*_COMMAND, 0x60B2)
 """Objects allowed in a mapped RPDO; except for the commands, they are sent as zero each cycle."""
 _MOST_PDOS = 512
+_MOST_NAMED = 4
 _FRAME_BITS = 64
 _MOST_ENTRIES = 8
 _PREDEFINED = 4
@@ -615,14 +616,20 @@ def _reason(
     problem = f"no {kind} can carry {names}, which torque control needs: "
     if not offers:
         return problem + f"the file describes no {kind}"
+    reasons = []
     if not usable:
-        return (
-            problem
-            + "no PDO can be set to answer every SYNC (transmission type 1 cannot be written)"
+        first = 0x1400 if kind == "RPDO" else 0x1800
+        places = ", ".join(f"[{first + one.number - 1:04X}sub2]" for one in offers[:_MOST_NAMED])
+        value = offers[0].transmission_type
+        reasons.append(
+            f"{places} AccessType does not let transmission type 1 (every SYNC) be written "
+            f"in place of {value}"
         )
     if blocked:
         names = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
-        return problem + f"{names} is not 1, and no default map contains it"
+        reasons.append(f"{names} is not 1, and no default map contains it")
+    if reasons:
+        return problem + "; ".join(reasons)
     return problem + "the maps are fixed, or have too few entries that can be written"
 
 
