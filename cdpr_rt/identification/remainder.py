@@ -56,7 +56,7 @@ def remaining_curve(
 def _share_of_one_turn(noise: float, variance: float) -> float:
     """Return the share of a curve of one turn that is used; `noise` is part of its variance.
 
-    A share k of a curve of which the share s repeats has the error s (1 - k)² + (1 - s) k². That is
+    If the share s of a curve repeats, a share k of it has the error s (1 - k)² + (1 - s) k². It is
     less than 1 - s, the error of the whole curve, if k > 2 s - 1.
     """
     most = 1.0 - noise / max(variance, _LEAST_VARIANCE)
