@@ -81,7 +81,7 @@ _MOST_WAITING = 1 << 18
 
 
 class FrameLog:
-    """Writes its listeners' frames by bus time, frames of the same time in the order of the buses.
+    """Writes its listeners' frames in order of bus time, then in the order of the buses.
 
     So the order does not depend on which bus the simulator polled first. If the file becomes
     unwritable, the log ends with a message and the buses continue.

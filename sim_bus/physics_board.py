@@ -26,7 +26,8 @@ _MAGIC = b"cdprPHB2"
 _MAX_AXES = 256
 # on other processors, a reader may see a sequence number before the data that it protects
 _IN_ORDER = ("x86_64", "i686", "i386")
-# each 8 bytes: first the drive's own part, after its sequence number, then the inputs of others
+# Each field has 8 bytes. The drive's own part comes first, after its sequence number. Then come the
+# inputs that other processes write.
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
 _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
 # faults that the drive's simulator injects into other devices

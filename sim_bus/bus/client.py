@@ -133,7 +133,7 @@ def sent_at(stamp_s: float) -> float:
 
 
 def _enlarge_buffer(sock: socket.socket) -> None:
-    """Enlarge the buffer against lost frames; privileged processes may exceed the limit."""
+    """Enlarge the buffer to lose fewer frames; privileged processes may exceed the limit."""
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
     with contextlib.suppress(PermissionError):
         sock.setsockopt(socket.SOL_SOCKET, _SO_SNDBUFFORCE, _SEND_BUFFER_BYTES)

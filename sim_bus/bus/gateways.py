@@ -303,7 +303,9 @@ _CHARACTER_S = 10 / LINE_BAUD
 _QUEUED_FRAMES = 256
 _READ_BYTES = 512
 _AHEAD_S = 0.002
-"""Longest lead of the host over the line; beyond it, writes wait as on a real port."""
+"""Longest time by which the host may be ahead of the line. Beyond it, writes wait as on a real
+port.
+"""
 
 
 class SerialAdapter:

@@ -259,7 +259,7 @@ def _filters(key: str, value: object) -> list[tuple[int, int]]:
 
 
 class Plan:
-    """Actions of a bus at given bus times; those of the same time in the order of their orders."""
+    """Actions of a bus at given bus times; simultaneous ones run in the order of their arrival."""
 
     def __init__(self) -> None:
         self.next_s = math.inf
@@ -503,7 +503,7 @@ class Hub:
                 hub.clock.run(wall_s)
 
     def _without_leader(self, events: list[tuple[int, int]]) -> list[tuple[int, int]]:
-        """Skip events of the leader, which waits for the end of its grant, unless it has closed."""
+        """Skip the leader's events while it waits for the end of its grant, unless it has left."""
         leader = self.lead.leader
         if leader is None:
             return events
@@ -728,7 +728,7 @@ class Hub:
                     self._prepare(now_s + period_s)
 
     def _act_until(self, now_s: float) -> None:
-        """Do what is planned before or at a SYNC, each at its own time."""
+        """Run the actions that are planned up to a SYNC, each at its planned time."""
         while self.plan.next_s <= now_s:
             self.advance(max(self.plan.next_s, self._now_s))
 

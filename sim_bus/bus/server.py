@@ -27,7 +27,7 @@ _CHANNEL = "can0"
 
 
 class Bench(Protocol):
-    """Takes orders beside the frames."""
+    """Takes orders that clients send on a bus beside the frames."""
 
     def connect(self, hubs: Sequence[Hub]) -> None:
         """Take the orders of clients of these buses."""

@@ -351,7 +351,7 @@ class ObjectDictionary:
 
 
 def _default_count(record: ODRecord | ODArray) -> int:
-    """Return the count if the EDS has none; in a PDO map, only entries with defaults count."""
+    """Return a count that the EDS omits; in a PDO map, count only entries with a default."""
     mapped = 0
     if record.index not in _MAPPINGS:
         return int(max(record.subindices))

@@ -1,7 +1,7 @@
 """PDOs of a slave: reception and transmission of each, and the work at SYNC and between.
 
-Received frames are written to the dictionary at the SYNC or immediately, with deadline
-monitoring; mapped objects are sampled and sent by the transmission types of CiA 301.
+Received frames are written to the dictionary at the SYNC or immediately, and their deadlines are
+monitored. Mapped objects are sampled and sent as the transmission types of CiA 301 specify.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ class Mapped:
 class PdoRecord:
     """Protects the parameters of one PDO from writes that CiA 301 forbids, and reports changes.
 
-    Rules of CiA 301: COB-ID, inhibit time and SYNC start value of an existing PDO cannot change;
-    its mapping can be written only while it does not exist, the entries only while the count is 0.
-    The count is rejected if an entry cannot be mapped or the sum exceeds 8 bytes.
+    Rules of CiA 301: while a PDO exists, its COB-ID, inhibit time and SYNC start value cannot
+    change, and its mapping cannot be written. The entries of a mapping can be written only while
+    the count is 0. The count is rejected if an entry cannot be mapped or the sum exceeds 8 bytes.
     """
 
     def __init__(
@@ -290,9 +290,9 @@ RTR_EVENT = 253
 class Tpdo:
     """One transmit PDO.
 
-    Event-driven PDOs (254, 255) are sent when their content differs from the last sent, when the
-    event timer expires and when the application requests it, but never within the inhibit time,
-    and once at the start. Type 0 is sent at the SYNC after its content changed.
+    Event-driven PDOs (254, 255) are sent once at the start, when their content has changed, when
+    the event timer expires, and when the application requests it. They are never sent within the
+    inhibit time. Type 0 is sent at the SYNC after its content changed.
     """
 
     def __init__(self, slave: CanopenSlave, number: int) -> None:

@@ -390,7 +390,8 @@ class TouchProbes:
             if not new & _ENABLE:
                 status &= ~(0xFF << 8 * k)
                 continue
-            # Removing an edge from the function, or enabling the probe, arms that edge again.
+            # A probe is armed again for an edge if the edge is removed from the function, or if the
+            # probe is enabled.
             going_on = old & new & _EDGES if old & _ENABLE else 0
             kept = going_on >> 3 | (_TOGGLES if going_on else 0)
             status = status & ~((0xFF & ~kept) << 8 * k) | _ENABLE << 8 * k

@@ -1,4 +1,4 @@
-"""Orders for faults at a bus time, beside the bus; and the truth for a judge."""
+"""Take orders for faults at a bus time, beside the bus, and show the truth to a judge."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class FaultBench:
     # -- orders
 
     def _order(self, wanted: Any) -> dict[str, Any]:
-        """Plan or inject a fault: {"fault", "axis", "value", "at_s"}; all but the first optional.
+        """Plan or inject a fault: {"fault", "axis", "value", "at_s"}; only `fault` is required.
 
         Without a value, the usual one is taken; 0 mends this fault. Return the order with the
         values used. Raises RequestError.

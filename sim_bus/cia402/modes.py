@@ -310,7 +310,7 @@ class Method:
     final: int
     """Direction of the last move, which crosses the edge and reaches the index."""
     leaving: bool = False
-    """Whether that crossing leaves the switch (else it enters it)."""
+    """Whether the last move leaves the switch; otherwise it enters the switch."""
     reverses: bool = False
     """Whether a limit switch reached during the search reverses the search."""
 

@@ -64,7 +64,7 @@ class DelayedContact:
             self.on, self._until = coil, None
 
     def window(self, drop_s: float) -> Window:
-        """Return between which times the contact is on if the coil drops at `drop_s`."""
+        """Return the times between which the contact is on if the coil drops at `drop_s`."""
         if self.stuck:
             return (-math.inf, math.inf if self.on else -math.inf)
         since = -math.inf if self.on else math.inf
@@ -79,9 +79,9 @@ class DelayedContact:
 class SimSafetyIo:
     """The safety I/O and its outputs; `axes` of the board are those of the profile, in order.
 
-    Its time is `bus_time`, that of the axes' buses in lockstep, or CLOCK_MONOTONIC. In lockstep
-    it acts only on requests, while bus time stands still. So it writes the changes that will occur
-    before the next request to the board in advance, with their bus times.
+    Its time is `bus_time`, that of the axes' buses in lockstep, or CLOCK_MONOTONIC. In lockstep it
+    acts only on requests, while bus time stands still. So it writes to the board, in advance and
+    with their bus times, the changes that will occur before the next request.
     """
 
     def __init__(

@@ -71,8 +71,8 @@ def _approach(value: float, goal: float, step: float) -> float:
 def ramp_velocity(m: Any, goal: float, h: float) -> None:
     """Move the reference velocity toward `goal`, braking when its magnitude falls.
 
-    On the way to rest it is never faster than the motor, or a wrong measured speed at the start
-    of the ramp would accelerate it.
+    On the way to rest, the reference is never faster than the motor. Otherwise a wrong speed,
+    measured at the start of the ramp, would accelerate the motor.
     """
     v = m.reference_velocity
     if goal == 0.0:
