@@ -7,11 +7,12 @@ import os
 _M_MMAP_THRESHOLD = -3
 _LARGE_BYTES = 1 << 20
 
-# Set this before numpy is loaded: the matrices are small, and idle threads of the algebra library
-# spin, which would take the core that controller and simulator share in lockstep.
+# Set this before numpy is loaded. The matrices are small, so more threads gain nothing. Idle
+# threads of the algebra library spin, and would occupy the core that controller and simulator share
+# in lockstep.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# glibc keeps memory freed by large arrays unless the threshold for "large" is set; a value set
-# by the user takes precedence, for example on machines with slow page faults.
+# glibc keeps the memory that large arrays have freed, unless the threshold for "large" is set. A
+# threshold set by the user takes precedence, for example on machines with slow page faults.
 if "MALLOC_MMAP_THRESHOLD_" not in os.environ:
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)

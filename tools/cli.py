@@ -127,7 +127,7 @@ PANELS = {
     "Simulate": ("demo", "sim"),
     "Machine": ("doctor",),
 }
-"""Which commands the help shows, and under which headings; it hides the others."""
+"""Commands that the help shows, by their headings. The help hides all other commands."""
 ALIASES = {
     "clear": "ack",
     "reset": "ack",
@@ -136,7 +136,9 @@ ALIASES = {
     "robot list": "profiles list robots",
     "robot check": "robot show",
 }
-"""What users of other controllers type, and the command that runs instead; it never moves."""
+"""Words that users of other controllers type, and the command that runs instead. That command never
+moves the robot.
+"""
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
@@ -144,7 +146,7 @@ GUESSES = {
     "gui": "`cdpr page` prints the address of a running robot's page for a browser, and "
     "`cdpr run ROBOT --open` starts a robot and opens it",
 }
-"""What users type for commands that move or do not exist, and the answer."""
+"""Words that users type for commands that move the robot or do not exist, and the answer."""
 STOPS = """Which stop do I want? In danger: the emergency-stop button, no command.
 
 hold     brake; the motors hold the position           power stays on
@@ -284,7 +286,7 @@ def main() -> None:
 
 
 def _with_help(text: str, context: Any) -> str:
-    """Return a message about the command line in one line, and where to find the solution."""
+    """Return a message about the command line as one line that also names where to find help."""
     text = " ".join(text.split()).removesuffix(".")
     if context is None or text.endswith("?") or "allowed: " in text:
         return text

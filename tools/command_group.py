@@ -18,7 +18,7 @@ from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import loading_notice, without_collection
 
 ROBOT_VARIABLE = "CDPR_ROBOT"
-"""Environment variable with the robot for commands that are given none."""
+"""Environment variable that names the robot if the command line names none."""
 HARMLESS = frozenset({"Look", "Describe", "Simulate", "Machine"})
 """Headings of commands that neither move anything nor switch power."""
 
@@ -51,8 +51,8 @@ def _unwrap(command: Any) -> None:
 def _accept_robot_option(command: Any) -> None:
     """Accept `--robot ROBOT` as the first argument of a command if that argument is a robot.
 
-    If the next argument is a choice and the robot is omitted, ROBOT_VARIABLE replaces it. For other
-    commands, the argument itself reads the variable.
+    If the user omits the robot and the next argument is a choice, ROBOT_VARIABLE names the robot.
+    In other commands, the argument itself reads the variable.
     """
     arguments = [param for param in command.params if param.param_type_name == "argument"]
     is_option = any("--robot" in param.opts for param in command.params)

@@ -32,8 +32,8 @@ _sockets: list[socket.socket] = []
 def compiling_notices_to(listener: Callable[[str], None]) -> Iterator[None]:
     """Call `listener` with the progress for each kernel that the block compiles.
 
-    The call is made in the compiling thread, and for each forwarded notice of another process. It
-    needs `announce_compiling` first.
+    The compiling thread calls it. Each notice that another process forwards also leads to a call.
+    Call `announce_compiling` first.
     """
     _listeners.append(listener)
     try:
@@ -120,7 +120,7 @@ class _Notice(logging.Handler):
 
 
 def announce_compiling(what: str = "the numerics") -> None:
-    """Report from now on when kernels must be compiled; `what` describes these in the message."""
+    """Report from now on when kernels must be compiled; `what` names the kernels in the message."""
     _share_with_children()
     _LOG.handlers[:] = [_Notice(what)]
     _LOG.propagate = False

@@ -16,9 +16,10 @@ _TEXT, _WIPE = "loading ...", "\r\x1b[K"
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Load modules in the block without garbage collection, which would take a tenth of the time.
+    """Load modules in the block without garbage collection.
 
-    The collector never searches what the first block of a process has loaded.
+    Collection would take a tenth of the loading time. Afterwards the collector never searches the
+    objects that the first block of a process has loaded.
     """
     enabled = gc.isenabled()
     gc.disable()

@@ -180,15 +180,15 @@ class LockstepRobot:
     true pose to `truth_log`, by default a temporary file. `record` is a folder for the recording
     (MCAP); without it nothing is recorded. `own` is the user's code, which the loop runs.
     `commissioned` is the folder with the commissioning results of the motors, if the robot's file
-    does not name it. Unless `compensated`, they are not used; unless `learns`, the control does not
-    learn the other motors. Unless `as_calibrated`, the calibration in force is not used; with
+    does not name it. They are used only if `compensated`. The control learns the other motors only
+    if `learns`. The calibration in force is used only if `as_calibrated`. With
     `calibration_in_doubt`, the limits are those of a robot without a calibration. `scanner` is the
     file in which a simulated external scanner logs the poses it measures, `camera` the socket of a
     simulated camera on the platform. Rows of the last `ring_s` are kept. If `pinned`, the simulator
     and all of this process share one core. `simulator` is a simulator that was started with these
     arguments; it belongs to this robot from `__enter__` on. The right to move is held from the
-    beginning, see `right`. Unless `boots`, the caller boots it. Raises CommandError, DriverError
-    and ProfileError as `cdpr run` does, Error if the robot does not get ready.
+    beginning, see `right`. If `boots` is false, the caller boots the robot. Raises CommandError,
+    DriverError and ProfileError as `cdpr run` does, Error if the robot does not get ready.
     """
 
     look_s = 0.02
@@ -486,7 +486,8 @@ class LockstepRobot:
     def truth(self) -> Any:
         """Return the truth at the last SYNC, a record of the pose log.
 
-        Without a platform it lacks the pose. `simulator.truth()` shows more, also without a loop.
+        Without a platform, the record has no pose. `simulator.truth()` shows more, and needs no
+        loop.
         """
         assert self._truth is not None  # opened with the robot
         return self._truth.last()
@@ -527,7 +528,8 @@ class LockstepRobot:
         """Return the files recorded so far, oldest first."""
         return [] if self._record is None else sorted(self._record.glob("*.mcap"))
 
-    # -- for the handle: a Ctrl-C takes effect between two cycles, and errors are the handle's
+    # -- for the handle: a Ctrl-C takes effect between two cycles, and errors are those of the
+    # handle
 
     def wait(self, seconds: float) -> None:
         """Run cycles for some seconds, at least one."""

@@ -60,7 +60,7 @@ _FACTORS = {"m": 1e3, "cm": 10.0}
 def read_point(text: str, names: Sequence[str]) -> dict[str, float]:
     """Return the coordinates that a mistyped point probably means, {} if that is not clear.
 
-    It takes what people type elsewhere: `x=1 y=2`, `1,2`, `(1, 2)`, `10mm 20mm`, `dx=5`.
+    It understands the notations of other programs: `x=1 y=2`, `1,2`, `(1, 2)`, `10mm 20mm`, `dx=5`.
     """
     found = list(_TYPED.finditer(text))
     values = [

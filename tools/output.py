@@ -256,7 +256,7 @@ class Output:
 
     @contextmanager
     def stage(self, what: str, quick: bool = False) -> Iterator[None]:
-        """Show the present work immediately, and that it continues while the block runs.
+        """Show the present work immediately, and report while the block runs that it continues.
 
         `quick` work is shown immediately only on a terminal, where it is erased at the end.
         """

@@ -40,8 +40,8 @@ def simulate(
 ) -> Robot:
     """Return a robot on simulated drives in this process, ready and without power.
 
-    `robot` is the name or file of a robot, `plant` a file with the deviations of the simulated
-    machine from it. `controller` replaces the built-in controller of the platform,
+    `robot` is the name or file of a robot, `plant` is a file that describes how the simulated
+    machine deviates from that robot. `controller` replaces the built-in controller of the platform,
     `tension_distribution` the tension distribution that the robot's file names. `programs` are
     further programs for `Robot.run`. If the robot's file names code, `allow_code` allows it from
     now on. Bus time passes only while a method waits, as fast as this machine computes: the same
@@ -85,7 +85,7 @@ def simulate(
 
 
 def _require_objects(controller: object, programs: object) -> None:
-    """Raise InvalidArgument unless the user's controller and programs are what they should be."""
+    """Raise InvalidArgument if the user's controller or programs have the wrong type."""
     from cdpr_rt.platform.own_controller import Controller  # noqa: PLC0415  # see above
 
     if controller is not None and not isinstance(controller, Controller):

@@ -1,7 +1,7 @@
 """Standard output and error that may fail: a full disk, a closed terminal, no reader.
 
 Writing to standard error never fails. Standard output has the result of a command: its failure is
-raised once, as OutputLostError. Standard input may have what was typed before its question.
+raised once, as OutputLostError. Standard input may contain text that was typed before the question.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ _PATIENCE_S: Final = 0.2
 PROCEDURE_VARIABLE: Final = "CDPR_PROCEDURE"
 """Environment variable of a command that a daemon runs: the token of the right to move."""
 procedure_token: Final = os.environ.pop(PROCEDURE_VARIABLE, None)
-"""That token, None for all other commands; it is not passed on to this command's own children.
+"""That token; None for a command that no daemon runs. This command does not pass it to its own
+children.
 
 A procedure ends with its standard input, and writes its progress as JSON to standard output.
 """

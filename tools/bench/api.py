@@ -87,7 +87,7 @@ class PoseController(Controller):
 
 
 class DoNothing(PoseController):
-    """Repeats the tensions of the last cycle, once it is `idle`."""
+    """Repeats the tensions of the last cycle while `idle` is set; before, it controls the pose."""
 
     idle = False
 

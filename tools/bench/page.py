@@ -152,8 +152,8 @@ def _others(url: str, pages: int, slow: int = 0) -> Iterator[None]:
 def press_stops(count: int, out: Output) -> Figures:
     """Press the page's stop button while the motors turn, with one page and with 20.
 
-    A figure lasts from the event of the press in Chromium until all drives have answered the first
-    command of the brake on the bus, one cycle after it was sent.
+    Each figure is the time from the press event in Chromium until all drives have answered the
+    first braking command on the bus. They answer one cycle after it was sent.
     """
     pressed: dict[str, list[float]] = {}
     with (

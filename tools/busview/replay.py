@@ -195,7 +195,7 @@ class Pacer:
 class Sender:
     """Sends recorded frames to a bus; at the end it may switch the drives off.
 
-    It does so on a real bus, and if it did not send the whole recording.
+    It switches them off if the bus is real, or if it did not send the whole recording.
     """
 
     def __init__(self, url: BusUrl, note: Callable[[str], None]) -> None:

@@ -64,7 +64,9 @@ class NodeInfo:
     answered: defaultdict[bytes, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     """The answers to these requests, from any device."""
     is_shared: bool = False
-    """Whether another client also makes transfers with the node, so answers may be for it."""
+    """Whether another client also makes transfers with the node, so that some answers may be meant
+    for that client.
+    """
 
     @property
     def repeated(self) -> set[bytes]:

@@ -286,7 +286,7 @@ _NAMES: Final = ("x", "y", "z")
 _BYTES: Final = 4096
 _MOVED_m: Final = 2e-3
 _DOUBTFUL_m: Final = 0.2
-"""A point that is further off must be typed twice: no exit point may move by more."""
+"""A point that deviates by more must be typed twice: a calibration moves no exit point by more."""
 
 
 def require_points_of(poses: int, path: Path) -> None:

@@ -89,7 +89,7 @@ def map_figure(outcome: Outcome, comparison: TruthComparison | None) -> Figure:
 
 
 def _shade(ax: Axes, outcome: Outcome, view: tuple[int, int]) -> QuadMesh:
-    """Draw the predicted position error; along the third axis, the worst counts."""
+    """Draw the predicted position error: at each point the largest along the third axis."""
     geometry = outcome.found.geometry
     platform, k = geometry.model.platform, geometry.coordinates
     axes = [

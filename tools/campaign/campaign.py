@@ -18,7 +18,7 @@ from cdpr_tools.processes import cores, runner
 
 _SEEDS_A_JOB: Final = 40
 _EVERY: Final = 20
-"""One seed in so many runs twice."""
+"""Of this number of seeds, one runs twice."""
 
 
 def drawn(seeds: Sequence[int], robots: Sequence[str]) -> list[Scenario]:

@@ -29,7 +29,7 @@ from cdpr_tools.daemon.child import end_with_launcher
 from cdpr_tools.processes import module_command
 
 _SEED_CPU_S: Final = 90
-"""Time of a processor after which a seed counts as hung."""
+"""Processor time after which a seed counts as hung."""
 _SEED_S: Final = 900.0
 """The same by the wall clock, for a seed that waits."""
 DID_NOT_START: Final = "did not start"
@@ -98,7 +98,7 @@ def _serve() -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End as by an interrupt, which removes temporary files, when the parent ends."""
+    """End when the parent ends, as after an interrupt, so that temporary files are removed."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     end_with_launcher(parent)
 

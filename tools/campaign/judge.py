@@ -20,9 +20,9 @@ from cdpr_tools.campaign.scenario import BEFORE_BOOT
 
 _TORQUE_Nm: Final = 1e-3
 _DEAD_WITHIN_S: Final = 3.0
-"""Longest time of the drives until they are without power, after their master has died.
+"""Longest time from the death of the master until the drives have no power.
 
-Those that do not detect their standstill end a quick stop after 2 s.
+Drives that do not detect standstill end a quick stop after 2 s.
 """
 _FELL_m: Final = 0.05
 _OVER: Final = 1.25
@@ -40,7 +40,7 @@ class Result:
     """Each fault that was injected, and what became of it."""
     digest: str = ""
     cpu_s: float = 0.0
-    """Time of a processor, with the seed's share of the start of its robot."""
+    """Processor time, including the seed's share of the start of its robot."""
     bus_s: float = 0.0
     notes: list[str] = field(default_factory=list)
 
@@ -50,9 +50,9 @@ class Predicted:
     """What `cdpr robot show` predicts, with a margin."""
 
     fastest_m_s: list[float]
-    """Speed downward after the loss of each cable or drive, or of the lengths."""
+    """Downward speed after the loss of each cable or drive, or of the lengths."""
     peak_N: FloatArray
-    """Tension of each cable after a slip, or by all the torque of its motor."""
+    """Tension of each cable after a slip, or at the full torque of its motor."""
 
 
 @lru_cache(maxsize=1)
@@ -92,7 +92,7 @@ class Judge:
         return float(min(times))
 
     def named(self) -> Iterator[tuple[dict[str, Any], float, bool]]:
-        """Yield each fault that the robot named: its record, when, and whether as the cause."""
+        """Yield each fault that the robot named: its record, its time, and whether as the cause."""
         seen = set()
         for status in self.played.statuses:
             for i, fault in enumerate(status["faults"] or ()):
@@ -114,7 +114,7 @@ class Judge:
         return bool(then) and then[-1]["state"] == "active" and then[-1]["reacting"] == "none"
 
     def off_since(self) -> float | None:
-        """Return the bus time since when no motor has had a torque; None if some has."""
+        """Return the bus time since which no motor has had torque; None if a motor has torque."""
         powered = np.flatnonzero((np.abs(self.truth["torque_Nm"]) > _TORQUE_Nm).any(axis=1))
         if not powered.size:
             return float(self.truth["time_s"][0])
@@ -183,7 +183,7 @@ _MAY_CAUSE: Final = {
     "FF00h": ("emcy", "emcy-flood"),
     "7305h": ("drive-fault",),
 }
-"""For codes of faults, the faults that may cause them; other codes may have any cause."""
+"""Possible causes of each fault code; a code that is not listed may have any cause."""
 _PULLED: Final = ("tension_high", "lengths", "lengths_jump", "slack", "broken_cable")
 """Limits that cables exceed because another cable pulls too much, or no longer."""
 _FROM_OUTSIDE: Final = ("push-x", "push-y", "push-z", "obstacle", "payload")
@@ -218,7 +218,7 @@ _OFF_WITHIN_S: Final = 0.05
 
 
 def _unsure(status: dict[str, Any]) -> bool:
-    """Return whether a status says that a drive may have power, or that a reaction goes on."""
+    """Return whether, by its status, a drive may have power or a reaction is not over yet."""
     unconfirmed = any(fault["code"].startswith("power_") for fault in status["faults"] or ())
     return unconfirmed or status["reacting"] != "none"
 

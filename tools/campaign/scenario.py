@@ -31,7 +31,7 @@ _TRANSITIONS: Final = ("enable", "tighten", "lower", "disable", "stop")
 
 @dataclass(frozen=True)
 class Scenario:
-    """One bad day of a robot."""
+    """One scenario: a robot, its plant, the actions of its users and its faults."""
 
     seed: int
     robot: str
@@ -202,7 +202,7 @@ def _faults(rng: random.Random, name: str, robot: Robot, at_s: float) -> Iterato
 
 
 _A_KILOGRAM: Final = ("push-x", "push-y", "push-z", "payload")
-"""Faults whose values are drawn for a kilogram of the platform."""
+"""Faults whose values are drawn per kilogram of the platform."""
 DRAWN: Final[dict[str, tuple[Any, Any] | None]] = {
     "drive-off": None, "drive-reboot": None, "drive-fault": None, "power-lost": None,
     "pre-operational": None, "nmt-stop": None, "commands-ignored": None,
@@ -219,5 +219,6 @@ DRAWN: Final[dict[str, tuple[Any, Any] | None]] = {
 }  # fmt: skip
 """Faults that are drawn, and the range of their values; None for the usual value.
 
-All of the simulator's but those of load cells, brakes and safety I/O, which these robots lack.
+These are all faults of the simulator except those of load cells, brakes and safety I/O, which these
+robots lack.
 """

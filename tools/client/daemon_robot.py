@@ -198,7 +198,7 @@ def robot_errors() -> Iterator[None]:
 
 
 def command_error(error: Error) -> CommandError:
-    """Return the command's error for an error of the handle: its origin, if a CommandError."""
+    """Return the command's error for an error of the handle: the CommandError behind it, if any."""
     cause = error.origin
     if not isinstance(cause, CommandError):
         bad = isinstance(error, InvalidArgument)

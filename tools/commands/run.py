@@ -398,8 +398,8 @@ def _launch(
 def _report_ready(report: dict[str, Any], url: str, out: Output) -> None:
     """Report on standard output that the daemon is ready, as JSON unless a person reads it.
 
-    Only a terminal shows the page's key, and only one made for this run: other output may go to a
-    log.
+    The page's key is shown only on a terminal, because other output may go to a log, and only if
+    the key was made for this run.
     """
     report["page"] = url.partition("#")[0] or None
     if out.as_json or not sys.stdout.isatty():

@@ -1,4 +1,4 @@
-"""`cdpr sim campaign`: play bad days on simulated robots and judge what the robots do."""
+"""`cdpr sim campaign`: play random scenarios on simulated robots and judge what the robots do."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def _shared_board(
 
 
 def _numbered(winch: Winch, nodes: int, unconfigured: bool) -> list[Winch]:
-    """Return `nodes` copies of the winch with consecutive node ids, or without if unconfigured."""
+    """Return `nodes` copies of the winch with consecutive node ids; unconfigured ones have none."""
     last = winch.node_id + nodes - 1
     if last > 127:
         raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {winch.node_id}")
@@ -251,7 +251,7 @@ def _record(
     scanner: Path | None,
     board: PhysicsBoard | None,
 ) -> None:
-    """Set up the logs of the platform's pose, each at another drive; there are three or more."""
+    """Set up the logs of the platform's pose, each at another drive of the three or more."""
     if truth_log is not None:
         with os_error_as(BadInputError, f"--truth-log {truth_log}"):
             drives[0].record_with(PoseLog(truth_log, body))

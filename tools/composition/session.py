@@ -74,8 +74,8 @@ def no_watches(_: Clock) -> AbstractContextManager[Sequence[Watch]]:
 def tension_watch(sensors: str | None, port: str | None) -> Watching:
     """Return a function that opens load cells as a session's watch; no watch without `sensors`.
 
-    Raises ConfigurationError if only one of both is given, and ProfileError; opening the watch
-    raises ModbusError if load cells do not answer.
+    Raises ConfigurationError if only one of `sensors` and `port` is given, and ProfileError.
+    Opening the watch raises ModbusError if load cells do not answer.
     """
     if (sensors is None) != (port is None):
         raise ConfigurationError(

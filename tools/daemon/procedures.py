@@ -20,7 +20,7 @@ from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.streams import PROCEDURE_VARIABLE
 
 _NICE: Final = ("nice", "-n10")
-"""Before a command that needs no real time, so that it does not delay the loop."""
+"""Words before a command that does not need real time, so that it does not delay the loop."""
 _REPORTS: Final = (("Calibration", "calibration.html"), ("Picture", "calibration.png"))
 
 
@@ -87,8 +87,10 @@ class _Plans:
         return Procedure(what, commands, PROCEDURE_VARIABLE, out, reports, takes_bus, moves, values)
 
     def _buses(self) -> tuple[str, ...]:
-        """Return the options for the loop's drives; simulated ones carry cables there, so for a
-        simulated robot those of motors that the command simulates.
+        """Return the options that select the drives.
+
+        The drives of a simulated loop carry cables. So for a simulated robot, the options select
+        motors that the command itself simulates.
         """
         settings = self.settings
         if settings.simulated:

@@ -1,4 +1,4 @@
-"""Describes robots for the page in separate processes, so that the service does not notice."""
+"""Describes robots for the page in separate processes, so that the service is not delayed."""
 
 from __future__ import annotations
 

@@ -624,10 +624,10 @@ def _bearable(answers: Answers) -> Default:
 
 
 def _taut(answers: Answers) -> Default:
-    """Return the least tension: what the cable needs, but above the winch's friction.
+    """Return the least tension: what the cable needs, but more than the winch's friction.
 
-    It is lower if the greatest tension is not much higher, because planned tensions are between
-    both.
+    Planned tensions lie between the least and the greatest one. If these two would be close
+    together, the least tension is lowered.
     """
     winch: Winch = answers["winch"][1]
     rubs_N = FRICTION_SHARE * winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)

@@ -21,7 +21,8 @@ SWING_S: Final = 2.0
 SMOOTHED_S: Final = 0.06
 """Longest time over which a controller may average its set-point."""
 RESTED_S: Final = 0.5
-"""After this time at rest, the end of the leg counts as the place where it came to rest."""
+"""After this time at rest, the end of the leg counts as the place where the platform came to rest.
+"""
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _LONG_REST_S: Final = 4.0
