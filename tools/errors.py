@@ -30,7 +30,7 @@ class BadInputError(CommandError):
 
 @contextmanager
 def os_error_as(kind: type[CommandError], what: str) -> Iterator[None]:
-    """Raise a `kind` with `what` and the system's reason instead of an OSError."""
+    """Replace an OSError in the block by a `kind` with `what` and the system's reason."""
     try:
         yield
     except OSError as error:
@@ -39,7 +39,7 @@ def os_error_as(kind: type[CommandError], what: str) -> Iterator[None]:
 
 @contextmanager
 def raised_as(kind: type[CommandError], error: type[Exception]) -> Iterator[None]:
-    """Raise a `kind` with the text of such an error instead of the error."""
+    """Replace an error of this type in the block by a `kind` with the same text."""
     try:
         yield
     except error as raised:

@@ -14,7 +14,7 @@ from cdpr_tools.errors import BadInputError, WorkFailedError
 
 
 def refuse_loss(folder: Path, raw: Path, overwrite: bool) -> None:
-    """Raise BadInputError if earlier recordings in `raw` would be lost from --out `folder`."""
+    """Raise BadInputError if a run with --out `folder` would lose earlier recordings in `raw`."""
     if raw.is_dir() and any(raw.iterdir()) and not overwrite:
         raise BadInputError(
             f"--out {folder}: contains the data of an earlier run; choose another folder, "

@@ -1,4 +1,4 @@
-"""Compare with SciPy: cost of a pose from cable lengths, and allowed error of its start."""
+"""Compare with SciPy: the cost of a pose from cable lengths, and how far off its start may be."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def _robot(name: str) -> Iterator[tuple[Robot, Any, Daemon, str]]:
 
 @contextmanager
 def _others(url: str, pages: int, slow: int = 0) -> Iterator[None]:
-    """Keep connections open that read like pages; `slow` of them do not read."""
+    """Keep connections open that behave like pages; `slow` of them do not read."""
     command = module_command("cdpr_tools.bench.page", url, str(pages), str(slow))
     with Popen(command, stdin=PIPE, stdout=PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None  # opened with PIPE

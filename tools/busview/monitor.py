@@ -322,8 +322,8 @@ def watch(
 ) -> None:
     """Show frames until the time is up, the user requests an end, or the bus is lost.
 
-    Received frames are stored before any is decoded, so that a fast bus fills this process's
-    memory and not the bus' buffer, where they would be lost.
+    All received frames are stored before any is decoded. So a fast bus fills this process's memory,
+    and not the bus' buffer, in which frames would be lost.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     more = False

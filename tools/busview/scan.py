@@ -43,7 +43,7 @@ DRIVE: tuple[Object, ...] = ((0x6502, 0), (0x6041, 0), (0x6061, 0), (0x603F, 0))
 _NAMES = {sdo.multiplexer(*what): f"{what[0]:04X}h" for what in (FIRST, *ALWAYS, *DRIVE)}
 _NAMES |= {sdo.multiplexer(index, sub): f"{index:04X}h:{sub}" for index, sub in ALWAYS if sub}
 _SEGMENT = b""
-"""Represents the next segment of a value in the counts of objects."""
+"""Key of the next segment of a value, in the counts of objects."""
 
 
 @dataclass

@@ -110,7 +110,8 @@ class DaemonPoses(run.StoredPoses):
         if not poses:
             write_text(self.folder / COUNTED, counted)
         self.save()
-        # written last: if killed before, the next reading still finds a restart by older lengths
+        # written last: if this process is killed before, the older lengths still show the next
+        # reading that counting has restarted
         write_text(self.folder / COUNTED, counted)
 
     def save(self) -> None:

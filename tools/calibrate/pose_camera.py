@@ -148,8 +148,8 @@ def camera_setup(
     """Return the camera's setup: intrinsics and sheets from their files, else from the simulation.
 
     Without a file, intrinsics are fitted as `cdpr camera calibrate` does, to images that the
-    simulated camera takes of a board; dictionary, ids and sizes of the markers are those that
-    were ordered from the printer. Raises ProfileError, CalibrationError.
+    simulated camera takes of a board. Dictionary, ids and sizes of the markers are those that were
+    ordered from the printer. Raises ProfileError, CalibrationError.
     """
     scene = CameraPlant() if plant is None else RobotPlant.load_file(plant).camera
     lens = CameraIntrinsics.load_file(intrinsics) if intrinsics else _by_board(out, scene)

@@ -294,7 +294,10 @@ def refuse_foreign(folder: Path) -> CalibrationData | None:
 
 
 def report_faults_only(criterion: StopCriterion) -> StopCriterion:
-    """Return a criterion that reports faults but never ends the run: the user gave the number."""
+    """Return a criterion that reports faults but never ends the run.
+
+    The user has given the number of poses.
+    """
 
     def asked(data: CalibrationData) -> str | None:
         criterion(data)

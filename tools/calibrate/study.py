@@ -287,8 +287,8 @@ def plateaus(rows: Rows) -> Rows:
     Trials have e(n)^2 = s(n)^2 + f^2. The model's s(n) keeps falling as 1/sqrt(n); the floor f
     comes from the squares that (3.40) omits. f^2 is the mean of e^2 - s^2, weighted by 1/s^4. The
     plateau begins at the n where s(n) = f: from there, more poses remove at most 1 - 1/sqrt(2) of
-    the error. A model that is 20 % off at 100 poses, as the thesis' is at 2.8 mm, reaches it at
-    100/(1.2^2 - 1) = 227 poses, and at the 3 mm of figure 3.7 at 198.
+    the error. The thesis' model is 20 % off at 100 poses and 2.8 mm. It reaches the plateau at
+    100/(1.2^2 - 1) = 227 poses, and with the 3 mm of figure 3.7 at 198.
     """
     found = []
     for name in FIGURES:

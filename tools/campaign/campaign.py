@@ -113,7 +113,7 @@ def _parts(scenario: Scenario) -> Iterator[_Part]:
 
 
 def _without(scenario: Scenario, parts: Sequence[_Part]) -> Scenario:
-    """Return the scenario without these parts; an action leaves its time as a wait."""
+    """Return the scenario without these parts; a wait of the same length replaces an action."""
     actions = [
         {"do": "wait", "wait_s": action["wait_s"]} if ("action", i) in parts else action
         for i, action in enumerate(scenario.actions)

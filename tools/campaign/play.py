@@ -116,7 +116,7 @@ class Player:
         self._plans = 0
 
     def play(self) -> Played:
-        """Do and break everything; return what happened."""
+        """Carry out all actions and faults; return what happened."""
         played, rig = self.played, self._rig
         memory_MB = _memory_MB()
         if self._scenario.recorded:

@@ -69,8 +69,8 @@ def end_daemon(daemon: Daemon, out: Output, socket: Path | None) -> None:
             out.say(ended_text)
             return
         if has_died(status) and not had_died and not dies:
-            # if drives do not confirm, the loop ends with an error, and the service stays to report
-            # it; otherwise its end may be visible before the service has also ended
+            # If drives do not confirm, the loop ends with an error, and the service stays to report
+            # it. Otherwise clients may see the end of the loop before the service has also ended.
             dies = str(status["reason"])
             with suppress(NoDaemonError):  # the next request detects it
                 daemon.post("/shutdown")

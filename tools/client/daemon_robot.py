@@ -118,8 +118,8 @@ def run(
     and `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code,
     `allow_code` allows it from now on. A bus with real drives needs `yes`. The daemon ends when the
     handle is closed or the script dies: it lowers the platform and removes the power. Raises
-    AlreadyRunning, InvalidRobot, InvalidArgument if `yes` is missing, and Error if the daemon does
-    not start, or does not confirm at its end that the power is off.
+    AlreadyRunning, InvalidRobot, and InvalidArgument if `yes` is missing. Raises Error if the
+    daemon does not start, or does not confirm at its end that the power is off.
     """
     _require_no_daemon(str(robot))
     buses = _texts("bus", bus or ())

@@ -347,11 +347,11 @@ def open_winch(
 ) -> Iterator[Session]:
     """Boot the winch's drive on `url` and prepare to run its axis, in its torque mode.
 
-    With `safety_io`, the profile of a safety I/O, power is possible only while it allows it; the
-    watches that `watching` opens are also checked every cycle. A drive in fault is
+    `safety_io` is the profile of a safety I/O; power is then possible only while this device allows
+    it. The watches that `watching` opens are also checked every cycle. A drive in fault is
     rejected, or acknowledged with `reset`. However the block ends, the drive's power stage is off
-    afterwards. Raises ConfigurationError if the bus cannot be opened, the errors of `watching` and
-    the safety I/O, and the drivers' errors if the drive does not boot.
+    afterwards. Raises ConfigurationError if the bus cannot be opened, and the drivers' errors if
+    the drive does not boot. Also raises the errors of `watching` and of the safety I/O.
     """
     require_fit(winch)
     with ExitStack() as stack:

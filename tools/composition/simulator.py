@@ -112,8 +112,8 @@ class OwnLoadCells(_OwnProcess):
 class OwnSimulator(_OwnProcess):
     """A running `cdpr sim up`.
 
-    If the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there; further simulators of
-    this process log to FILE with -2, -3 and so on appended to its name.
+    If the environment has CDPR_SIM_FRAME_LOG=FILE, the simulator logs all frames to FILE. Further
+    simulators of this process append -2, -3 and so on to the name of FILE.
     """
 
     def __init__(

@@ -52,9 +52,8 @@ class Truth:
         """Return the true angle from the index at given SYNCs in rising order, (k,).
 
         The index comes once a turn. The drive and the simulator may count from the index of
-        different turns, so whole turns are added until the angle agrees with the measured one,
-        (k,).
-        Raises BadInputError if a SYNC is missing.
+        different turns. So whole turns are added until the angle agrees with the measured one,
+        (k,). Raises BadInputError if a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])
         # one record per SYNC, counted from zero

@@ -48,7 +48,7 @@ def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
 def figure_of(robot: Robot, platform: Platform) -> Figure:
     """Return the picture of a robot.
 
-    A robot in space is seen from the front, from the side and from above; the workspace is cut
+    A robot in space is seen from the front, from the side and from above. The workspace is cut
     through the middle of the box of targets. Its colour shows how far tensions can stay from their
     bounds in home's orientation; a dotted line encloses targets accepted in all orientations.
     """

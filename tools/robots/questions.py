@@ -154,8 +154,9 @@ Answers = dict[str, Any]
 """The answers by key, in SI units, with the type that `Question.read` returns."""
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 Masses = Callable[[Answers, float], tuple[float, float] | None]
-"""Returns the least and greatest mass that the cables hold in the middle of the frame, given the
-answers so far and a mass to start with; None if it finds none."""
+"""Returns the least and greatest mass that the cables hold in the middle of the frame. It takes the
+answers so far and a mass with which the search starts. It returns None if no mass is found.
+"""
 _POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
 _PEAK_SHARE, _RATED_TIMES = 0.5, 2.0
 """Proposed torque, if rated torque is too little for cables that pull against each other: the

@@ -52,8 +52,8 @@ class Variable(NamedTuple):
 
 
 OPERATION, SCALE, PLACE = "operation", "scale", "place"
-# section 2.7 gives the round trips; the manual trials had no robot and hardly any delay, so they
-# are compared with a round trip of 0 s
+# Section 2.7 gives the round trips. The manual trials had no robot and hardly any delay, so they
+# are compared with a round trip of 0 s.
 VARIABLES: Final = {
     OPERATION: Variable("round_trip_s", "round trip", "{:.0f} ms", True, {
         0.0: ThesisRow("manual", (0.000, -0.070), (3.61, 3.03), 47.5, 3.6),

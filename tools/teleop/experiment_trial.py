@@ -135,8 +135,9 @@ class Condition:
 class PerfectRobot:
     """A platform that follows the hand within its speed and acceleration, without any error.
 
-    As in the program `pose`, each movement of the hand moves the target by `scale` times as much,
-    unless the clutch was pressed when it began. All remaining errors come from the operator.
+    As in the program `pose`, each movement of the hand moves the target by `scale` times its
+    length. A movement that begins with the clutch pressed does not count. All remaining errors come
+    from the operator.
     """
 
     def __init__(self, platform: Platform, begin_m: FloatArray) -> None:

@@ -103,8 +103,8 @@ def _at_right_angles(along: FloatArray) -> FloatArray:
 def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
     """Return the RMS distance over all lines, from the line and from the set-point.
 
-    With `less_mean` the mean of each line's errors is subtracted first, because the mean shows how
-    well the start is known, not how a motor runs.
+    With `less_mean` the mean of each line's errors is subtracted first. The mean shows how well the
+    start is known, not how a motor runs.
     """
     straight = [one for one in line_errors(recorded) if not one.is_turn]
     return (

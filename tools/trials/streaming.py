@@ -82,8 +82,8 @@ _CLUTCH_S: Final = 0.4
 class RandomHandMotion:
     """A random motion of a hand: waves of some seconds, with flicks, pauses and the clutch.
 
-    `rng` draws rates and phases; the waves extend to `reach` (d,), m or rad, in the hand's own
-    space, and are at times faster than any robot.
+    `rng` draws rates and phases. The waves extend to `reach` (d,), m or rad, in the hand's own
+    space. At times they are faster than any robot.
     """
 
     def __init__(self, rng: np.random.Generator, reach: FloatArray) -> None:
