@@ -61,8 +61,8 @@ def bits_by_length(can_id: int) -> tuple[int, ...]:
 def arbitration_key(can_id: int) -> int:
     """Return a number that orders frames by arbitration: the smallest wins the bus.
 
-    The 11 leading bits of the identifier are sent first; if they are equal, a standard data frame
-    beats a standard remote frame, which beats the extended ones (recessive SRR and IDE bits).
+    The 11 leading bits of the identifier are sent first. If they are equal, a standard data frame
+    beats a standard remote frame, and both beat extended frames (recessive SRR and IDE bits).
     """
     remote = 1 if can_id & RTR_FLAG else 0
     if can_id & EFF_FLAG:

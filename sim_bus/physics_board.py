@@ -135,8 +135,7 @@ class BoardAxis:
     """One axis of a board. The drive calls `publish`; other devices call the setters; all may read.
 
     Every field has one writer. Reads of the drive's part are consistent, because they are repeated
-    if a write occurs (a sequence lock, which needs stores that become visible in order: see
-    `attach`).
+    if a write occurs. This sequence lock needs stores that become visible in order, see `attach`.
     """
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:

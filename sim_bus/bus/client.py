@@ -370,9 +370,9 @@ class Route:
 class Contention:
     """The next frame of each client, for arbitration; each client's frames keep their order.
 
-    In lockstep the smallest identifier wins. In paced mode frames have times. A frame sent while
-    the wire could still be busy with an earlier one contends with it; a later frame waits, even if
-    the simulator was delayed and both arrived together.
+    In lockstep the smallest identifier wins. In paced mode frames have times. A frame contends with
+    an earlier one if it was sent while the wire could still be busy with that one. A frame that was
+    sent later waits, even if the simulator was delayed and both arrived together.
     """
 
     def __init__(self, *, paced: bool, bitrate: int) -> None:

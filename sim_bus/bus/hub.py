@@ -70,8 +70,8 @@ class Watcher:
     def readable(self, wait_s: float | None, *, exactly: bool) -> list[tuple[int, int]]:
         """Return the readable descriptors, each with its events.
 
-        Wait up to `wait_s` (None: indefinitely) for one; with `exactly`, check once more after the
-        wait, at `looked_s`.
+        Wait up to `wait_s` (None: indefinitely) for one. With `exactly`, the wait is not rounded to
+        milliseconds. `looked_s` is the time of the last check.
         """
         if wait_s != 0.0 and (exactly or (wait_s is not None and wait_s < FINE_WAIT_S)):
             select.select([self._poller], [], [], wait_s)
@@ -313,7 +313,7 @@ class Hub:
         self._routes: dict[int, Route] = {}
         self._accepts = [node.accepts for node in self.nodes]
         self.prepares = [node.prepare for node in self.nodes if isinstance(node, PreparingNode)]
-        # bus time 0 switches the nodes on
+        # the nodes are switched on at bus time 0
         self._now_s = -1.0
         self._leftover = False
         self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
@@ -690,9 +690,9 @@ class Hub:
     def _sync(self, frame: bytes, source: Client, route: Route, length: int) -> None:
         """Move bus time, advance the nodes to it, then deliver the SYNC to all.
 
-        On a bus that a client leads, only that client's SYNC moves time. Frames that it sent to the
-        buses before this one are processed first, even if they arrived after the last poll of
-        those buses, because the drives of all buses share their physics.
+        On a bus that a client leads, only that client's SYNC moves time. If the client sent frames
+        to other buses before this SYNC, they are processed first, even if they arrived after the
+        last poll of those buses. The drives of all buses share their physics.
         """
         nodes = self.nodes
         leader = self.lead.leader
@@ -817,8 +817,8 @@ class Hub:
     def _flush(self) -> None:
         """Send the frames in the outboxes in the order of arbitration.
 
-        Frames with which other nodes of this process answer wait for the next call, so that
-        nodes that answer each other in a ring cannot lock out the clients.
+        If other nodes of this process answer, their frames wait for the next call. So nodes that
+        answer each other in a ring cannot lock out the clients.
         """
         batch = self._batch
         self._leftover = False

@@ -1,7 +1,7 @@
 """Quirks of the simulated drives: deviations of each maker's firmware from CiA 402.
 
-They are chosen by the drive's identity (1018h), independently of the profiles that a master reads,
-so that an error in a profile shows on the bus.
+They are chosen by the drive's identity (1018h), and not by the profiles that a master reads. So an
+error in a profile shows on the bus.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class FaultBench:
         return {"fault": name, "axis": axis, "value": amount, "at_s": at_s}
 
     def _places(self, axis: object, fault: Fault | None) -> list[int]:
-        """Return the numbers of the drives that a fault, or `MEND`, concerns, from 0."""
+        """Return the indices, from 0, of the drives that a fault or `MEND` concerns."""
         n = len(self._drives)
         if fault is None and axis is None:
             return list(range(n))
@@ -150,7 +150,7 @@ class FaultBench:
 
     def _truth(self) -> dict[str, Any]:
         body = self._drives[0].axis.body
-        for record in self._records:  # some end without being mended
+        for record in self._records:  # some faults end without being mended
             injection = self._drives[(record.axis or 1) - 1].fault_injection
             if record.ended_s is None and record.fault not in injection.broken():
                 record.ended_s = self._drives[(record.axis or 1) - 1].axis.time

@@ -34,7 +34,7 @@ _BABBLE_FRAME = b"\x00\xff\x81BABBL"
 
 @dataclass(frozen=True)
 class Fault:
-    """One kind of fault; `apply` breaks a drive, or its robot, by an amount; 0 mends it."""
+    """One kind of fault; `apply` breaks a drive or its robot by an amount, and 0 mends it."""
 
     name: str
     meaning: str
@@ -48,7 +48,7 @@ class Fault:
     needs: str = ""
     """What the robot must have: "cable", "platform", "space" (not in a plane), or a "board"."""
     lasts: bool = True
-    """Whether it lasts until it is mended; the others happen once."""
+    """Whether the fault lasts until it is mended; other faults happen once."""
     left: Callable[[FaultInjection], float] | None = None
     """Returns the present amount of a fault that may also end without `mend`."""
 
@@ -129,7 +129,7 @@ class FaultInjection:
     # -- faults by their names
 
     def apply(self, fault: Fault, amount: float) -> None:
-        """Inject a fault, or mend it by 0."""
+        """Inject a fault; the amount 0 mends it."""
         if amount == 0 and not fault.lasts:
             return
         fault.apply(self, amount)
@@ -184,7 +184,7 @@ class FaultInjection:
         self._present[SILENCE] = ms
 
     def set_absent(self, why: str, absent: object) -> None:
-        """Be on the bus, or not, because of a fault."""
+        """Leave the bus because of a fault, or return to it."""
         (self._absent.add if absent else self._absent.discard)(why)
         self._update_active()
 

@@ -236,7 +236,7 @@ class StateMachine:
             self.mode.resume()
 
     def _brake(self, option: int) -> None:
-        """Brake to rest: 1 slow-down ramp, 2 quick-stop ramp, 3 and 4 at the limit."""
+        """Brake to rest: option 1 slow-down ramp, 2 quick-stop ramp, 3 and 4 at the limit."""
         axis = self.axis
         if option == 1 and self.mode.torque_mode:
             axis.set_torque_slope(axis.object(0x6087))

@@ -345,7 +345,7 @@ def _angle(degrees: float | None, absent: float) -> float:
 def _set_servo(m: Any, plant: Plant, ratings: MotorRatings) -> None:
     drive = plant.drive
     # At the velocity loop's crossover, observer, current loop and integrator cause half of the
-    # phase lag; these ratios leave a phase margin of about 50 degrees.
+    # phase lag. These ratios leave a phase margin of about 50 degrees.
     crossover = 2.0 * math.pi * min(50.0, drive.current_loop_bandwidth_Hz / 10.0)
     m["velocity_gain"] = plant.inertia_kg_m2 * crossover
     m["integral_rate"] = crossover / 4.0
