@@ -98,7 +98,9 @@ _CYCLE_OVER = 1 << 62
 """Bit of TPDOS_RECEIVED that is set from the end of a cycle until the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
-"""Largest share of cycles without exactly one answer: for a good rate; before the loop trips."""
+"""Largest shares of cycles without exactly one answer: up to the first, the rate is good; beyond
+the second, the loop trips.
+"""
 _MOST_EXTRA_FRAMES = 400
 
 
@@ -216,7 +218,7 @@ def _take_tpdo(
     if fields_came >> STATUSWORD & 1:
         words[0, i] = ints[STATUSWORD, i]
         _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
-    # of two equal TPDOs the later one counts: the first may be a late one of the previous cycle
+    # if a TPDO arrives twice, the second counts: the first may be late, from the previous cycle
     expected = ints[TPDOS_EXPECTED, i]
     ints[EXTRA, i] += (ints[TPDOS_RECEIVED, i] & expected) >> pdo & 1
     ints[TPDOS_RECEIVED, i] |= 1 << pdo

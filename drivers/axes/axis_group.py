@@ -162,8 +162,9 @@ def _axis_fault(axis: AxisConfig, i: int, column: Ints) -> Fault:
 # The cyclic exchange of n axes on one bus: SYNC out, feedback in, commands out.
 
 _SYNC_ID = 0x080
-# wall time, if another process leads the lockstep: for the first answer, because the simulator may
-# be delayed; for the last answer, shorter than bus time stands still; after a cycle that missed one
+# Timeouts in wall time, used if another process leads the lockstep. The first is for the first
+# answer, because the simulator may be delayed. The second is for the last answer, and shorter than
+# the time for which bus time stands still. The third applies after a cycle that missed an answer.
 _ANSWER_TIMEOUT_S, _PARTIAL_ANSWER_TIMEOUT_S, _REPEATED_TIMEOUT_S = 2.0, 0.4, 0.02
 _PACED_SHARE = 0.75
 _POWER_OFF_TIMEOUT_S = 1.0

@@ -30,7 +30,8 @@ _PAUSE_S = 0.5
 _ANSWER_SHARE = 1.0
 _LOCKSTEP_ANSWER_S = 0.2
 _SETTLE_SHARE = 0.25
-"""Time after a cycle's answers until its SYNC is on all buses, as a share of the period."""
+"""Time after a cycle's answers by which its SYNC has been on all buses, as a share of the period.
+"""
 _LOCKSTEP_SETTLE_S = 0.005
 _MOST_CYCLES_AHEAD = 8
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64

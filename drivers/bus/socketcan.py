@@ -161,7 +161,7 @@ def _ask(sock: socket.socket, request: int, name: str) -> int:
 
 
 def _enlarge_buffer(sock: socket.socket) -> None:
-    """Enlarge the receive buffer against lost frames; privileged processes may exceed the limit."""
+    """Enlarge the buffer to lose fewer frames; privileged processes may exceed the limit."""
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
     with contextlib.suppress(PermissionError):
         sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, BUFFER_BYTES)

@@ -314,5 +314,5 @@ class SdoClient:
 
 
 def _segment(kind: int, toggle: int) -> Accept:
-    """Accept a frame that is (0) or confirms (1) the segment with this toggle bit."""
+    """Accept a frame with this toggle bit: a segment (0), or the confirmation of a segment (1)."""
     return lambda frame: frame[0] >> 4 & 0x0F == kind << 1 | toggle
