@@ -24,7 +24,7 @@ class Error(Exception):
     """Base class of all errors of a robot handle."""
 
     origin: Exception | None = None
-    """Error of the daemon's client for which this one stands, if any."""
+    """Error of the daemon's client that this error replaces, if any."""
 
 
 class InvalidRobot(Error):  # noqa: N818

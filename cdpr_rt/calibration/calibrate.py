@@ -165,8 +165,8 @@ def _with_camera(
     require_enough(geometry, start.seen.some(~held_out(start.seen)))
     known, of_points = without_slipped_points(geometry, start.seen, slack_N)
     given = start.camera.knowledge
-    # the given pose of the camera is used only after it agrees with the readings: a wrong pose
-    # would look like faults of cables, and hide real ones
+    # The given pose of the camera is used only after it agrees with the readings. A wrong pose
+    # would look like faults of cables, and hide real ones.
     unknown = start.camera.with_hand_eye(
         given.position_m, given.rotation, np.array(UNKNOWN_HAND_EYE_STD)
     )
@@ -217,8 +217,8 @@ def _grid(geometry: CableGeometry) -> FloatArray:
 
 
 # The frame of a calibration. Lengths, and markers at unknown poses, determine positions relative to
-# each other, but not where the robot is in its room: the residuals do not change if all exit points
-# and poses move together. Then only the robot's file determines the frame.
+# each other. They do not determine where the robot is in its room: the residuals do not change if
+# all exit points and poses move together. Then only the robot's file determines the frame.
 
 STAND_m: Final = 0.005
 STAND_rad: Final = 0.005

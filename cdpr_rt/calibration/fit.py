@@ -691,8 +691,8 @@ def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeom
 def weighed_fit(found: Fit, weighed: CableGeometry, given: Observations) -> Fit:
     """Return another fit, with balanced tensions of `given` and the weights of `weighed`.
 
-    If the balance finds errors of the tensions that are so large that the lengths contradict them,
-    another force acts on the platform, and the tensions are not corrected.
+    The balance may find errors of the tensions that are so large that the lengths contradict them.
+    Then another force acts on the platform, and the tensions are not corrected.
     """
     return _weighed_fit(found, weighed, given, balance(found, given))
 

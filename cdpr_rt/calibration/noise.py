@@ -42,14 +42,16 @@ _LEAST_RHO, _WINDOW = 0.05, 20
 _GAP = 2.5
 """A gap between readings is longer than this multiple of the median interval."""
 _GLITCH, _BESIDE, _LEAST_m, _LEAST_rad = 6.0, 9, 0.003, 0.02
-"""A point is a glitch if it jumps by more than this many standard deviations and by more than the
-least distance or angle; number of neighbours in time to compare with."""
+"""A point is a glitch if it jumps by more than this many standard deviations, and by more than the
+least distance or angle. The second number is that of the neighbours in time to compare with.
+"""
 _OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
 _LOOSE_DRUM, _FAR = 0.1, 3.0
 """Initial standard deviation of drums; multiple of the assumed one above which drums are wrong."""
 _AIM_SHARE, _COPY_SHARE = 0.25, 0.1
-"""Standard deviation of the platform's rotation about its target, as a share of the largest target;
-share of this standard deviation below which targets are copies of measured rotations."""
+"""Standard deviation of the platform's rotation about its target, as a share of the largest target.
+Then the share of this deviation below which targets are copies of measured rotations.
+"""
 
 WithoutFaults = Callable[[CableGeometry, Observations], tuple[Fit, int]]
 """Function that returns a fit without faulty readings, and the number of these."""

@@ -255,9 +255,9 @@ LEAST_POSES = _EACH * LEAST_VERIFYING
 def held_out(seen: Observations) -> BoolArray:
     """Return which poses are held out from the fit, (N,).
 
-    One pose in five is held out, but at least three with a measured point if there are six or more,
-    so that three also remain for the fit. While the platform moves, one block of time in five is
-    held out.
+    One pose in five is held out. If six or more poses have a measured point, at least three of
+    these are held out, and three also remain for the fit. While the platform moves, one block of
+    time in five is held out.
     """
     if seen.time_s is not None:
         block = (np.arange(seen.poses) * (_BLOCKS / seen.poses)).astype(int)

@@ -44,11 +44,12 @@ class AxisCompensation:
 
     `table_Nm[0]` is for increasing angles, `table_Nm[1]` for decreasing ones; sample j lies at
     2π·j/m from the index. `look_ahead_s` is the time from the sampling of an angle to the mean time
-    at which the torque computed from it acts. Angle and velocity are the set-point's plus the
-    deviation from it and the deviation's rate, both from a tracking observer with a double pole of
-    time constant `observer_s` (0: the encoder's reading and the set-point's velocity). Friction is
-    evaluated at that velocity, for the set-point's direction. If it falls with speed, this removes
-    the negative damping that makes a rotor stick and slip.
+    at which the torque computed from it acts. Angle and velocity are those of the set-point, plus
+    the deviation from it and the rate of that deviation. A tracking observer with a double pole of
+    time constant `observer_s` estimates both. If `observer_s` is 0, they are the encoder's reading
+    and the set-point's velocity. Friction is evaluated at that velocity, for the set-point's
+    direction. If friction falls with speed, this removes the negative damping that makes a rotor
+    stick and slip.
     """
 
     table_Nm: FloatArray

@@ -103,7 +103,7 @@ class Pid:
 
     The derivative is filtered by a first-order lag (backward difference); integration stops while
     it would drive the torque further beyond its limit. While an axis follows a moving set-point,
-    and shortly after, the integral may be faster, to keep up with cogging and friction; a blocked
+    and shortly after, the integral may be faster, to keep up with cogging and friction. A blocked
     axis does not count as following. Shapes: `gains` one per axis, `limit_Nm` (n,).
     """
 

@@ -143,8 +143,8 @@ def standstill_gains(design: PidDesign, period_s: float) -> PidDesign:
     """Return a design with as much gain at standstill as `MAX_SENSITIVITY` allows.
 
     A rotor stands still if the stiffness of the loop exceeds the slope of its cogging. This trades
-    phase margin for stiffness: the proportional gain grows by a factor, the integral by its
-    square, as far as the loop still tolerates `INERTIA_RATIO` times the inertia.
+    phase margin for stiffness. The proportional gain grows by a factor, and the integral gain by
+    the square of that factor. The loop must still tolerate `INERTIA_RATIO` times the inertia.
     """
     gains, inertia = design.gains, design.inertia_kg_m2
 

@@ -91,8 +91,8 @@ class Cycle:
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
-        # a SYNC that meets commands on the wire is late, and delays all later ones; if this happens
-        # in every cycle, as with a silent drive, the cycle rate must still be kept
+        # A SYNC that meets commands on the wire is late, and delays all later ones. If this happens
+        # in every cycle, as with a silent drive, the cycle rate must still be kept.
         too_late_s = _TOO_LATE_SHARE * period
         begin_s = min(max(self._deadline_s, self._free_s), self._deadline_s + too_late_s)
         now = clock.now_s

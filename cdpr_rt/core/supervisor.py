@@ -477,7 +477,7 @@ class Supervisor:
         """Check how much cable lengths contradict each other; return the `Reaction` so far.
 
         `elapsed_s` is the time since the last cycle. `axis` is the axis of the cable that
-        contradicts the others, -1 if it is not known; in that case `suspects` returns the possible
+        contradicts the others, -1 if it is not known. In that case `suspects` returns the possible
         axes, the most likely first. It is called once, when the limit is exceeded. `jump_m` is the
         largest sudden change of a residual, and `jumped` the cable of that residual, -1 if it is
         not known.

@@ -147,8 +147,9 @@ class LoopParts:
     axis_names: Sequence[str] = ()
     """Names of the axes in messages."""
     lengths_disagree: Callable[[], tuple[float, int, float, int]] | None = None
-    """Function that returns the largest normalised residual of cable lengths, m, and its cable, or
-    -1; then the largest sudden change of a residual, and its cable, or -1."""
+    """Function that returns the largest normalised residual of cable lengths, m, and its cable.
+    Then follow the largest sudden change of a residual, and its cable. -1 is an unknown cable.
+    """
     length_suspects: Suspects = no_suspects
     """Function that returns the axes whose cables may contradict the others, the most likely
     first."""

@@ -205,8 +205,8 @@ class SafeStop:
         if reaction is not Reaction.CONTROLLED_STOP or not self._engine.driving:
             return StopMethod.TORQUE_OFF
         failed = then is LoopState.FAULT and self._supervisor.limit in POSE_UNRELIABLE
-        # encoders and winches are right if only the code of a program has failed; a second
-        # failure, while the platform is being lowered by its pose, is not treated like this
+        # If only the code of a program has failed, encoders and winches still work. If it fails
+        # again while the platform is being lowered by its pose, the pose is no longer used.
         only_code = self._engine.program_fault is not None and not self.reacts_to_fault
         if self._lowering is None or not failed or only_code:
             return StopMethod.BRAKE

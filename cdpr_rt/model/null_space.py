@@ -34,10 +34,10 @@ def null_space(
 
     t0 has the least norm; n - rank rows of N are valid. Rows of W t = -w_e are divided by `scale`
     (d,): A = W/scale and b = -w_e/scale are written as `scaled` = [A b] (d, n + 1). If W is rank
-    deficient, `space` is not written. `scratch` (4, m, m), m >= n and 8, is overwritten. Returns
-    the rank, or -1 if an argument is invalid: W, w_e or `bounds` (3, n), which has rows of lower
-    bounds, upper bounds and wanted tensions, is not finite or has another size, or a lower bound is
-    above its upper bound.
+    deficient, `space` is not written. `scratch` (4, m, m), m >= n and 8, is overwritten. The rows
+    of `bounds` (3, n) are lower bounds, upper bounds and wanted tensions. Returns the rank, or -1
+    if W, w_e or `bounds` is not finite or has another size, or if a lower bound is above its upper
+    bound.
     """
     n = space.shape[1]
     d = scale.size

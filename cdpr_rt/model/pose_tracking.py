@@ -258,9 +258,9 @@ def _swing(filters: FloatArray, rotation: FloatArray, moved: float, swing: Float
 
 
 # Kernels that convert a platform's set-point to a pose, and to the motors' set-points. A set-point
-# is (d,), one entry for each controlled direction: coordinates of the origin, and the rotation
-# vector φ from the orientation at home, Q = exp(φ) Q_home. This has no singularity at angles below
-# half a turn.
+# (d,) has one entry for each controlled direction. These are the coordinates of the origin, and the
+# rotation vector φ from the orientation at home, Q = exp(φ) Q_home. This has no singularity at
+# angles below half a turn.
 
 
 @jit

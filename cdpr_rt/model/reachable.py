@@ -280,8 +280,8 @@ def reach_all(
 ) -> None:
     """Write the share of each straight way on which a platform is held and clear, eq. (3.38).
 
-    Ways lead from the position `start` (d,) to each of `ends` (m, d); all other arguments are those
-    of `first_contact` and `held_until`; `centred` is the geometry of the latter.
+    Ways lead from the position `start` (d,) to each of `ends` (m, d). All other arguments are those
+    of `first_contact` and `held_until`; `centred` is the geometry for `held_until`.
     """
     way = np.zeros((WAY_ROWS, 3))
     for k in range(3):

@@ -29,10 +29,10 @@ class StandingTensions:
     """Tensions (n,) at the winches under which a standing platform does not move.
 
     Their wrench is vertical. If moderate tensions can press the platform down, they do so. No
-    tension is then below the least one, and all are as far above it as possible, up to the planned
-    ones, because friction would otherwise let cables sag. If the friction of the winches may exceed
-    these tensions, the wrench presses with less than the weight. The cables can then be pulled
-    harder, if necessary harder than planned.
+    tension is then below the least one. All tensions are as far above it as possible, up to the
+    planned ones, because friction would otherwise let cables sag. If the friction of the winches
+    may exceed these tensions, the wrench presses with less than the weight. The cables can then be
+    pulled harder, if necessary harder than planned.
 
     If the cables cannot press the platform down, they carry 0.57 of its weight, which does not lift
     it even at the overshoot. Tensions exceed the friction of the winches if possible. Otherwise

@@ -53,10 +53,11 @@ def closed_form(
 ) -> bool:
     """Write the tensions t_m - W^+(w_e + W t_m) (n,) nearest to wanted ones t_m.
 
-    While a tension is outside its bounds, the one furthest outside is fixed at its bound and the
-    others are computed again, until no null direction is left. `space` (n + 1, n) with `r` null
-    directions and `bounds` (3, n) are those of `null_space`. `scratch` (4, m, m), m >= n and 8, is
-    overwritten. Returns False if this finds no tensions within bounds, although some may exist.
+    While tensions are outside their bounds, the one furthest outside is fixed at its bound, and the
+    others are computed again. This ends when no null direction is left. `space` (n + 1, n) with `r`
+    null directions and `bounds` (3, n) are those of `null_space`. `scratch` (4, m, m), m >= n and
+    8, is overwritten. Returns False if this finds no tensions within bounds, although some may
+    exist.
     """
     Q, x, column, c, free = scratch[0], scratch[1, 0], scratch[1, 1], scratch[1, 2], scratch[1, 3]
     tolerance = start(space, r, bounds, x)

@@ -116,8 +116,8 @@ def lead(
     limit.
 
     The coordinates (k,) move by `scale` times the hand's displacement, within the box from `low` to
-    `high`; the rotation vector (d - k,) turns with it, within `angle`. `pose` and `last` are the
-    hand's poses (7,); `last` is overwritten. `about` (d - k,) are the axes of rotation.
+    `high`. The rotation vector (d - k,) turns with the hand, within `angle`. `pose` and `last` are
+    the hand's poses (7,); `last` is overwritten. `about` (d - k,) are the axes of rotation.
     `scratch` (4, 4) is overwritten.
     """
     k, up, edge = low.size, low.size - 1, FREE

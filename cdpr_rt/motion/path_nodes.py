@@ -211,8 +211,10 @@ _IN_CORNER: Final = 8
 """Intervals of a cut corner."""
 _FULLNESS: Final = 2.0
 """Ratio of the derivative at both ends of a corner to the length cut there. With 2, a corner
-without a turn is a line with constant derivative; the inner two control points are 0.8 of the cut
-away from its ends, so that all of the curve is within the cut of the corner's point."""
+without a turn is a line with constant derivative. The inner two control points are 0.8 of the cut
+away from its ends. So no point of the curve is farther from the corner's point than the length of
+the cut.
+"""
 _GAUSS: Final = (
     (0.5 - np.sqrt(0.15), 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + np.sqrt(0.15), 5.0 / 18.0),
 )  # fmt: skip

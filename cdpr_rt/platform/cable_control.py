@@ -655,8 +655,8 @@ class CableControl(PlaceChecks):
 
         On the stand, the integral part is bounded until the set-point moves. Otherwise it would
         press the platform against the stand, and the first motion off the stand would start against
-        this force. If this method is called in every cycle, and tensions are planned for the
-        set-point, which do not hold the platform at another pose, the set-point follows the
+        this force. Tensions that are planned for the set-point do not hold the platform at another
+        pose. With such tensions, if this method is called in every cycle, the set-point follows the
         platform slowly.
         """
         again = self._on_stand and on_stand and not self.gains.follows_pose

@@ -29,9 +29,9 @@ from cdpr_rt.refusal import CommandRefusal, RefusalCode
 # Decision whether a platform has arrived at a set-point at rest.
 
 NEAR_m, NEAR_SHARE = 5e-4, 1e-4
-"""Distance within which a platform has arrived, unless friction keeps it farther away; and the
-share of the frame's diagonal that is used on large robots, whose long cables stretch and sag
-more."""
+"""Distance within which a platform has arrived, unless friction keeps it farther away. On large
+robots, whose long cables stretch and sag more, it is this share of the frame's diagonal.
+"""
 _NEAR_S = 0.2
 _WAITED_S = 5.0
 

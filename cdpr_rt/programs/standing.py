@@ -84,10 +84,11 @@ def why_not_at_home(
 ) -> str:
     """Return the reason why the cables must not be tightened at home, or "".
 
-    The lengths `length_m` (n,), tracked since they were known, have to be those at home with
-    `tension_N` (n,), each within the tolerance of home and that of lengths. One length may be
-    further off: its cable has slipped if the lengths disagree. If they agree, their pose has to be
-    near home. No pose is searched far from home, because several poses may belong to the lengths.
+    The lengths `length_m` (n,) have been tracked since they were known. They have to be those at
+    home with `tension_N` (n,), each within the tolerance of home and that of lengths. One length
+    may be further off: its cable has slipped if the lengths disagree. If they agree, their pose has
+    to be near home. No pose is searched far from home, because several poses may belong to the
+    lengths.
     """
     control = parts.control
     off_m = np.abs(length_m - control.lengths_at_home(tension_N))

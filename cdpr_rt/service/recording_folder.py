@@ -39,7 +39,7 @@ class RecordingsBusyError(ControlError):
 class RecordingFolder:
     """The recordings of one robot in a folder.
 
-    `command` is a command line that reads one of them: it is followed by the kind of the output
+    `command` is a command line that reads one of them. Its arguments are the kind of the output
     (`csv`, `columns`, `picture`), the file, fields separated by commas or "", begin and end in s,
     and the number of points. It writes the output, or the reason of its failure to standard error.
     """

@@ -40,8 +40,8 @@ class BusAxes:
 class AxisBuses:
     """n axes on several buses; implements `cdpr_rt.core.exchange.AxisDevice` as `AxisGroup` does.
 
-    If the axes are numbered bus by bus, the arrays of each bus are slices of the whole and nothing
-    is copied; otherwise their values are copied once a cycle. If one bus fails, the loop still
+    If the axes are numbered bus by bus, the arrays of each bus are slices of the whole, and nothing
+    is copied. Otherwise their values are copied once a cycle. If one bus fails, the loop still
     exchanges the others, and switches them off at the end.
 
     Raises BusError if only some of the buses run in lockstep, and DriverError for a PDO map that

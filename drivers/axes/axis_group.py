@@ -180,12 +180,11 @@ def has_deadline(axis: AxisConfig) -> bool:
 class AxisGroup:
     """n axes on one bus; implements `cdpr_rt.core.exchange.AxisDevice`.
 
-    When used as a context manager, it leaves the drives without power, however the block ends.
-    An axis is enabled only after a `request`, in a mode that the drive has confirmed; a fault
-    cancels the request and stays until `acknowledge_fault`. The arrays of `feedback` and
-    `command` are overwritten in place and must not be replaced; `arrays` holds the state
-    if these axes are part of a larger device. A cycle allocates nothing, takes no lock and does not
-    log.
+    When used as a context manager, it leaves the drives without power, however the block ends. An
+    axis is enabled only after a `request`, in a mode that the drive has confirmed; a fault cancels
+    the request and stays until `acknowledge_fault`. The arrays of `feedback` and `command` are
+    overwritten in place and must not be replaced. `arrays` holds the state if these axes are part
+    of a larger device. A cycle allocates nothing, takes no lock and does not log.
 
     Raises BusError if the bus is gone, and DriverError for a PDO map that does not support torque
     control.

@@ -1,8 +1,8 @@
 """LSS master of CiA 305: find drives by their identity, set their node id and bit rate.
 
 The `canopen` package's master is not used, because it accepts any frame as the answer to the last
-request: with several drives without a node id, its fastscan can assemble an identity that none
-of them has. It also waits 0.2 s for each number of an address and drops the error codes.
+request. With several drives without a node id, its fastscan can assemble an identity that none of
+them has. It also waits 0.2 s for each number of an address and drops the error codes.
 """
 
 from __future__ import annotations

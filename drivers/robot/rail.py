@@ -63,9 +63,9 @@ def move(
 ) -> MoveResult:
     """Move the rail to `target_m`; however the move ends, the axis is braked and without power.
 
-    The robot is marked as not calibrated before the carriage moves. Raises RailError for
-    tight cables, winches with power, a brake that does not hold, a target beyond the
-    travel or a move that does not arrive; RailStoppedError on request; StateFileError and the
+    The robot is marked as not calibrated before the carriage moves. Raises RailError for tight
+    cables, winches with power, a brake that does not hold, a target beyond the travel or a move
+    that does not arrive. Raises RailStoppedError if a stop was requested, StateFileError, and the
     errors of the axis.
     """
     if not rail.travel_min_m <= target_m <= rail.travel_max_m:
