@@ -22,7 +22,8 @@ Times = NDArray[np.int64]
 Work = Callable[[], object]
 Way = Callable[[], AbstractContextManager[Iterator[Work]]]
 """Yields the calls that are timed one after the other. Between them it may prepare the next call
-and check the last result; this is not timed."""
+and check the last result. This work is not timed.
+"""
 Row = dict[str, Any]
 """Figures of one way, by the names of their columns."""
 

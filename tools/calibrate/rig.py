@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from cdpr_tools.calibrate.pose_camera import PoseCamera
 
 
-# True and scanned poses of a simulated robot; they verify a calibration, which does not use them.
+# True and scanned poses of a simulated robot. They only verify a calibration; its fit does not use
+# them.
 
 _Vector = tuple[float, ...]
 _Matrix = tuple[_Vector, ...]

@@ -124,7 +124,7 @@ class Daemon:
 
     @contextmanager
     def control(self) -> Iterator[str]:
-        """Hold the right to move in the block; yield its token. This does not renew the right."""
+        """Hold the right to move in the block; yield its token. The caller must renew the right."""
         token = str(self.post("/control", {"ttl_s": _LEASE_S})["token"])
         try:
             yield token

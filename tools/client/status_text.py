@@ -34,7 +34,7 @@ def power_text(status: dict[str, Any]) -> str:
 
 
 def death_text(status: dict[str, Any]) -> str:
-    """Return that the control loop has died, the state of the power, and the next command."""
+    """Return as text that the control loop has died, the power's state, and the next command."""
     return (
         f"{status['reason']}; {power_text(status)}; next: `cdpr stop` ends the rest of "
         "the daemon, then `cdpr run` starts it again"
@@ -42,7 +42,7 @@ def death_text(status: dict[str, Any]) -> str:
 
 
 def after_stop_text(status: dict[str, Any]) -> str:
-    """Return that a daemon has ended, and the state of the drives' power in its last `status`."""
+    """Return as text that a daemon has ended, and the drives' power in its last `status`."""
     if has_died(status):
         return f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it again"
     if status["read_only"]:
@@ -311,7 +311,7 @@ _SLOW: Final = 0.9
 
 
 def slow_text(status: Mapping[str, Any]) -> str:
-    """Return that a simulated robot runs slower than real time; empty if it does not."""
+    """Return as text that a simulated robot runs slower than real time; empty if it does not."""
     factor = status.get("real_time_factor")
     if factor is None or factor >= _SLOW:
         return ""

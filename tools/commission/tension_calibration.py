@@ -305,7 +305,7 @@ class Hoist:
 
 
 class _Lowering:
-    """Motion from the current set-point back to the start; it begins at half of its duration."""
+    """Motion from the current set-point back to the start, in the second half of its duration."""
 
     def __init__(self, here_rad: FloatArray, start_rad: FloatArray, speed_rad_s: float) -> None:
         travel = start_rad - here_rad

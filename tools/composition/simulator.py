@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cdpr_profiles.robot import Robot
     from cdpr_tools.composition.fault_injection import SimulatorChannel
 
-# if installation has not compiled the physics, the first start does; it may take minutes
+# if the physics was not compiled at installation, the first start compiles it for some minutes
 _START_TIMEOUT_S = 600.0
 # a process that is only delayed still completes its logs
 _STOP_TIMEOUT_S = 60.0

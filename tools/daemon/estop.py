@@ -216,7 +216,7 @@ _STARTING_S: Final = 60.0
 
 
 def launcher_left(socket: Path) -> str:
-    """Return that the launcher of the daemon at `socket` runs and what to do; "" if it ended."""
+    """Return as text that the launcher at `socket` still runs, and what to do; "" if it ended."""
     pid = launcher_pid(socket.with_suffix(LAUNCHER_SUFFIX))
     if pid is None:
         return ""
@@ -261,7 +261,7 @@ def end_starting(socket: Path) -> list[str]:
 
 
 def _end_start(path: Path, pid: int) -> str:
-    """End a launcher whose loop does not run; it ends the processes that it has started."""
+    """End a launcher whose loop does not run; the launcher ends the processes it has started."""
     done = f"{path.stem}: its daemon was starting; it has ended"
     try:
         pidfd = os.pidfd_open(pid)

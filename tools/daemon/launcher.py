@@ -107,9 +107,9 @@ _SERVICE_STOP_S = 10.0
 _LOOP_STALLED_S = 2.0
 # the service turns about ten times a second; a disk may delay it
 _SERVICE_STALLED_S = 10.0
-# a service that is idle for so long is not even loading its libraries, on any machine
+# a service that is idle for this time is not even loading its libraries, on any machine
 _SERVICE_START_S = 30.0
-# a service that is busy for so long has loaded everything and is busy with something else
+# after this time a busy service has loaded everything, and is busy with something else
 _SERVICE_LOADING_S = 600.0
 # delays before restarts: a service that dies immediately must not restart in a tight loop
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)

@@ -218,7 +218,7 @@ class RecordingMapping(Profile):
     """Ignored, as is `rate_Hz`: a recording keeps the values as they are."""
 
     def axis_columns(self) -> AxisColumns | None:
-        """Return the columns of the axes; those of a motor as columns of its one axis."""
+        """Return the columns of the axes; a motor counts as a single axis."""
         motor = self.columns
         if motor is None or motor.time is None:
             return self.cables

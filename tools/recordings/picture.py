@@ -45,7 +45,7 @@ _LETTER = 0.015
 _SEEN_ns: Final = 200_000_000
 """Longest delay from a reaction to its reason, which recordings take from the loop's status."""
 _MOVED = 1e-6
-"""A coordinate that varies by less (m or rad) over a recording is not one that the robot moves."""
+"""If a coordinate varies by less (m or rad) over a recording, the robot does not move it."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
 _IN_PLACE: Final = (
     ("position_rad", "cable length (m)", "cable_length_m"),

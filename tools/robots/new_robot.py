@@ -50,7 +50,7 @@ _MIDDLE, _MIDDLE_HEIGHT, _LOW = (0.3, 0.7), (0.25, 0.75), (0.0, 0.4)
 """Part of the frame in which the box of targets is searched first in space: along width and depth,
 along its height, and along its height if all cables come from above."""
 _CENTRED_SHARE = 0.6
-"""A box about the frame's middle is proposed if it has this share of the largest one's area."""
+"""A box about the frame's middle is proposed if it has this share of the largest box's area."""
 _HANGING_SHARE, _NEAR_m = 0.5, 0.01
 """Where masses are tried: share of the upper exit points' height; half the side of a box there."""
 _MASSES = np.geomspace(0.02, 50.0, 80)
@@ -177,7 +177,7 @@ def held_masses(answers: Answers, usual_kg: float) -> tuple[float, float] | None
 
 
 def _centred(box: Box, middle_m: FloatArray) -> Box:
-    """Return the box, or the largest one in it about `middle_m`, if that is almost as large."""
+    """Return the largest box about `middle_m` in `box` if it is almost as large, else `box`."""
     low, high = np.array(box.low_m), np.array(box.high_m)
     half = np.minimum(high - middle_m, middle_m - low)[:-1]
     if half.min() <= 0.0 or np.prod(2.0 * half / (high - low)[:-1]) < _CENTRED_SHARE:

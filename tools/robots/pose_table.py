@@ -91,8 +91,8 @@ def read_pose_table(path: Path, n: int) -> PoseTable:
 def swing(table: PoseTable) -> dict[str, float]:
     """Return amplitude and period of a swing that the inclinometer shows; empty for none.
 
-    The period is that of the strongest frequency in roll and pitch. It must stand out from its
-    neighbours, unlike those of other motions.
+    The period is that of the strongest frequency in roll and pitch. Its peak must stand out from
+    neighbouring frequencies; other motions have no such peak.
     """
     if table.time_s is None or table.tilt_rad is None or len(table.time_s) < _FEWEST:
         return {}

@@ -35,7 +35,8 @@ from cdpr_tools.trials.run import TrialRun, trial_run
 PACKET_S: Final = 0.02
 """Time between two packets: 50 per second (Tremblay, section 2.5.1: 30 to 60)."""
 SHARE_THERE: Final = 0.05
-"""Share of the round trip on the way to the robot; the rest is the picture's (section 2.7)."""
+"""Share of the round trip for the way to the robot; the rest is the picture's delay (section 2.7).
+"""
 LONGEST_S = 900.0
 """A run that takes longer is aborted."""
 _MARK = "path"

@@ -54,7 +54,9 @@ class StickMap:
     dead_zone: float
     """Share of a stick's travel around the middle in which it has no effect."""
     speed_m_s: float
-    """Speed of the hand with a fully pushed stick; it rotates `TURN_RAD_PER_m` times as fast."""
+    """Speed of the hand with a fully pushed stick. The hand turns at `TURN_RAD_PER_m` times this
+    speed.
+    """
 
     @property
     def axes(self) -> tuple[int, ...]:

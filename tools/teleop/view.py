@@ -29,7 +29,7 @@ Point = tuple[float, float]
 class View:
     """Draws a session on each request.
 
-    `reason` is why the robot was held or stopped before; it is not shown again.
+    `reason` is why the robot was held or stopped before. The view does not show this reason again.
     """
 
     def __init__(
