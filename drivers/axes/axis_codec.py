@@ -135,8 +135,8 @@ def decode(
 ) -> int:
     """Decode the first `last` of `frames` (k, 16 or more) into the state of n axes.
 
-    `slots` (2048, 2) and `fields` (n, 8, 5) are those of `GroupLayout`; `state_table` (128,) gives
-    the state by statusword; `ints`, `floats` and `flags` have the rows named above, `words` (1, n)
+    `slots` (2048, 2) and `fields` (n, 8, 5) are those of `GroupLayout`. `state_table` (128,) gives
+    the state by statusword. `ints`, `floats` and `flags` have the rows named above. `words` (1, n)
     is the statusword. Returns how many more axes have answered. Frames that are not TPDOs of these
     axes are listed in `others` (k + 1,): their number, then the row of each.
     """

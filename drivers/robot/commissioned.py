@@ -52,8 +52,8 @@ def folder_called(name: str, node_id: int) -> str:
 def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
     """Return `robot` with the profiles found in `folder`, which has a subfolder for each axis.
 
-    Axes without a profile there keep the one of the robot's file; None leaves all unchanged. Raises
-    ConfigurationError for a folder without any profile.
+    Axes without a profile there keep the profile of the robot's file. If `folder` is None, all axes
+    keep it. Raises ConfigurationError for a folder without any profile.
     """
     if folder is None:
         return robot
