@@ -674,8 +674,8 @@ def with_noise_seen(found: Fit, file: CableGeometry, found_N: float | None) -> C
 def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeometry]:
     """Return a fit with the accuracy of readings that it finds, and the file with that accuracy.
 
-    From the second round on, the elongation is the mean of two cases: true tensions scatter about
-    the given ones, or given tensions scatter about the true ones.
+    From the second round on, the elongation is the mean of two cases. In one, true tensions scatter
+    about the given ones; in the other, given tensions scatter about the true ones.
     """
     given, slope_noise = found.seen, 0.0
     weighed = file

@@ -114,7 +114,7 @@ class Outcome:
     def differs_from_file(self) -> bool:
         """Whether the readings show a significant difference from the robot's file.
 
-        Parameters change by more than noise, and the change has an effect: positions or
+        Parameters change by more than noise, and the change has an effect. Either positions or
         orientations move by more than their uncertainty, or held-out poses are predicted much
         better.
         """

@@ -108,10 +108,10 @@ def fall(
     """Write the poses (c, 4, 3) after each of c cycles into `path`; return the number of cycles.
 
     When nothing has moved for a second, the winches stop pulling, as at the end of `lower`. When
-    nothing has moved for another second, friction holds the platform, and the simulation ends.
-    The platform rests at `start` (4, 3). `body` is that of `body_kernel`, `free` (6,) is 1 for
-    existing components of the twist, 0 otherwise; `geometry` (13, n) is that of
-    `cable_kernel`, `feet` (k, 3) are points that can touch the ground, m, in the platform's frame.
+    nothing has moved for another second, friction holds the platform, and the simulation ends. The
+    platform rests at `start` (4, 3). `body` is that of `body_kernel`, `geometry` (13, n) that of
+    `cable_kernel`. `free` (6,) is 1 for existing components of the twist, 0 otherwise. `feet`
+    (k, 3) are points that can touch the ground, m, in the platform's frame.
     """
     c, n = parameters[0], winches.size
     h, weight = c.period_s / c.steps, c.period_s / (c.period_s + FILTER_S)

@@ -196,7 +196,8 @@ def _linearised(
     """Return the used columns, harmonics shifted by the present lag, and the extra columns.
 
     Extra columns are the derivatives by a further lag, and by the relative change of cogging and of
-    friction per second: the motor warms up, and the coefficients apply to the end of the runs.
+    friction per second. This change occurs because the motor warms up; the coefficients apply to
+    the end of the runs.
     """
     x = rows.x[:, columns]
     orders = np.repeat(np.array(layout.orders, float), 2)

@@ -221,8 +221,8 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     """Cut one contiguous run into windows; None if it is too short for a window.
 
     `latency_s` is the time from the sampling of an angle to the mean time at which the torque sent
-    in that cycle acts: an angle belongs to the torque sent one latency earlier. `spacing_s` is the
-    distance of windows; by default it depends on the run's speed.
+    in that cycle acts. So an angle belongs to the torque sent one latency earlier. `spacing_s` is
+    the distance of windows; by default it depends on the run's speed.
     """
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))

@@ -57,9 +57,9 @@ class Interference:
     """Contacts among cables, the platform's body and boxes of the room.
 
     Two things are in contact if they are closer than the clearance. A cable is the straight centre
-    line of its free part, so the clearance has to cover its sag. If two bodies share a point, or
-    come closer than the clearance at an exit or anchor point, the cable is not checked near that
-    point, for a length of ten clearances. In a planar robot the cables run in layers beside each
+    line of its free part, so the clearance has to cover its sag. Two bodies may share a point, or
+    come closer than the clearance at an exit or anchor point. The cable is then not checked for a
+    length of ten clearances from that point. In a planar robot the cables run in layers beside each
     other and the body, so they are checked against the boxes of the room only. An object must be
     used by one thread only.
     """

@@ -225,9 +225,9 @@ def descend(
     If convergence is slow, as with lengths that disagree, the search uses Newton's method. A step
     that increases the cost is undone and damped (Levenberg-Marquardt). The search ends when the
     last two steps show that the remaining distance is below TOLERANCE. It ends as STALLED if the
-    cost is above `accepted` and the next step would reduce it only a little, because a step towards
-    lengths that agree removes nearly all of the cost. Returns outcome, number of steps, and cost.
-    If a length is nan, the outcome is SINGULAR.
+    cost is above `accepted` and the next step would reduce it only a little. A step towards lengths
+    that agree would remove nearly all of the cost. Returns outcome, number of steps, and cost. If a
+    length is nan, the outcome is SINGULAR.
     """
     cost = compare(geometry, lengths, pose, cables)
     if not cost < math.inf:

@@ -135,10 +135,9 @@ class PlatformStatics:
         """Return the margin (...), N: how far all tensions can stay from both their bounds.
 
         If it is negative, some tension must be outside its bounds by that much. With an
-        acceleration, the margin is the least over both signs of the acceleration in all directions
-        together, including the same share of the angular acceleration if targets may be turned. It
-        is also the least over all `turns_rad` (k, 3). It is -inf if the cables cannot hold some
-        direction.
+        acceleration in all directions together, the margin is the least over both signs. If targets
+        may be turned, the same share of the angular acceleration is included. The margin is also
+        the least over all `turns_rad` (k, 3). It is -inf if the cables cannot hold some direction.
         """
         workspace = self.model.workspace(acceleration_m_s2, 0.0)
         margins = [

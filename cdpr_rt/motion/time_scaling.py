@@ -2,9 +2,10 @@
 
 The passes of the scaling kernel scale each run between two stops. The motion is then averaged over
 time, so that its acceleration has no steps. The average is too fast at positions at which the
-motion was slow for a moment only. These are slowed down and the run is scaled again, until all
-samples of the smoothed motion keep all limits, and the set-point stays on the path between samples.
-A small remaining excess is removed by slowing the whole run, which breaks no limit.
+motion was slow for a moment only. These positions are slowed down and the run is scaled again. This
+is repeated until all samples of the smoothed motion keep all limits, and the set-point stays on the
+path between samples. A small remaining excess is removed by slowing the whole run, which breaks no
+limit.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ cogging and errors of torque constants, plus the correction b of this feedback. 
 t becomes a - d s/(s + k) for every a that the loop commands. So feedback and loop do not disturb
 each other. a is low-passed like the reading.
 
-A cell may send wrong readings. So b may only use the part of the reserve between planned tensions
-and their bounds that the loop's force leaves: a + b is within the bounds for every reading. The
-learnt torques may be wrong too, so b together with them stays within a maximum.
+A cell may send wrong readings. So b may only use a part of the reserve between planned tensions and
+their bounds: the part that the loop's force leaves. Then a + b is within the bounds for every
+reading. The learnt torques may be wrong too, so b together with them stays within a maximum.
 """
 
 from __future__ import annotations

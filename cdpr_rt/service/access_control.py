@@ -160,8 +160,8 @@ class AccessControl:
     as `Host`. No limit here applies to stops, but the server's limit of TCP connections applies to
     all requests. Clients of the Unix socket all belong to one user and have no common rate limit.
     `refused` is called for every rejected client. `holds_right` returns whether a token belongs to
-    the client that may move the robot, which a flood from its own address must not block. If a key
-    is required, one of `tickets` opens a WebSocket, or downloads one recording.
+    the client that may move the robot. A flood from the address of that client must not block it.
+    If a key is required, one of `tickets` opens a WebSocket, or downloads one recording.
     """
 
     def __init__(
