@@ -432,7 +432,7 @@ class Connection:
         selector.register(sock, selectors.EVENT_READ, self._serve)
         try:
             self._send_text("< hi >")
-        except OSError:  # it has left already
+        except OSError:  # the client has left already
             self.close()
 
     def _serve(self, events: int) -> None:

@@ -148,7 +148,7 @@ class Lead:
         """End the lead of `client`; bus time stands still until a client sends or leads."""
         if client is self.leader:
             client.send = client.sock.send
-            with contextlib.suppress(OSError):  # it does not read
+            with contextlib.suppress(OSError):  # the client does not read
                 self._send_held(client)
             self._end()
 
@@ -216,7 +216,7 @@ class Lead:
         except BlockingIOError:
             self.time_pending = True
         except OSError:
-            # it has disconnected, which reading from it shows
+            # the leader has disconnected, which the next read from its socket shows
             return
 
 

@@ -138,7 +138,7 @@ class HeartbeatConsumers:
         """React to the loss of a node: EMCY, NMT state from 1029h:01, the application."""
         slave = self._slave
         slave.communication_error(emcy.HEARTBEAT, bytes([node]))
-        # the application first: it must see the loss itself, not a change of NMT state
+        # Inform the application first: it must see the loss itself, not a change of NMT state.
         slave.app.on_heartbeat_lost(node)
         behaviour = slave.od.get_int(0x1029, 1, 0)
         if behaviour == 0 and slave.nmt_state == NmtState.OPERATIONAL:

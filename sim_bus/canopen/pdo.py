@@ -249,7 +249,7 @@ class Rpdo:
         """Write the pending frame into the dictionary."""
         frame, self.pending = self.pending, None
         if frame is not None:
-            # both have the same length: they are made from the mapping
+            # both lists have the same length, because they are made from the mapping
             for write, value in zip(self._writers, self._unpack(frame, 8)):  # noqa: B905
                 write(value)
 

@@ -147,7 +147,7 @@ class SimSafetyIo:
             self._board_faults = self._board[0].io_faults
             self._apply_faults()
         now, drop_s = self._clock(), self._watchdog_drop_s
-        if now > drop_s:  # it accepts no outputs until its watchdog is fed again
+        if now > drop_s:  # the device accepts no outputs until its watchdog is fed again
             if not self._dropped:
                 self._switch(drop_s)
             self._coils = [False] * len(self._coils)

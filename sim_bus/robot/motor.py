@@ -139,7 +139,7 @@ def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
         v = v0 + v1 * w
         tension = pull + b * (v - c * w)
     if m.load_kind == 2 or v > landing:
-        v = landing  # it stands on the floor, or is fixed
+        v = landing  # the mass stands on the floor, or the cable's end is fixed
         w = braked(m, A + c * b * c, B + c * (pull + b * v))
         tension = pull + b * (v - c * w)
     if tension <= 0.0 or stretch + h * (v - c * w) <= 0.0:

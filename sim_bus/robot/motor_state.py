@@ -63,7 +63,7 @@ _PHYSICS = [
     ("sensed", _F8),  # the same as measured by the drive's sensors
     ("rise", _F8),  # K above ambient
     ("true_gain", _F8),  # torque gain with its ripple in the last step
-    ("cogging_Nm", _F8),  # likewise
+    ("cogging_Nm", _F8),  # cogging in the last step
     ("friction_Nm", _F8),
 ]
 _CABLE = [
