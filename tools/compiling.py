@@ -64,7 +64,7 @@ def _first_to_tell() -> bool:
     except OSError:  # the command that started this process has ended
         pass
     finally:
-        visitor.close()  # it stays in the queue, which nobody empties
+        visitor.close()  # the connection stays in the queue, which nobody empties
     return True
 
 

@@ -81,7 +81,7 @@ class RightInBusTime:
     def drop(self) -> None:
         """Release the right."""
         token, self.token = self.token, None
-        with suppress(LeaseError):  # it has expired
+        with suppress(LeaseError):  # the right has expired
             self.lease.release(token)
 
     def fall_silent(self) -> None:

@@ -77,6 +77,7 @@ def stop_on_signals(notice: str = "") -> Iterator[StopRequest]:
     try:
         yield request
     finally:
-        # in one step: an interrupt in between would hit the interpreter while it shuts down
+        # In one step, because an interrupt in between would hit the interpreter during its
+        # shutdown.
         signal.signal(signal.SIGINT, signal.SIG_IGN if request() else before[signal.SIGINT])
         signal.signal(signal.SIGTERM, before[signal.SIGTERM])

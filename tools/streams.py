@@ -75,7 +75,7 @@ class _Standard(io.RawIOBase):
         # a terminal can be ready for writing and still block; O_NONBLOCK on the inherited file
         # description would also apply to the shell
         flags = os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
-        with suppress(OSError):  # it belongs to another user, or has just closed
+        with suppress(OSError):  # the terminal belongs to another user, or has just closed
             self._fd = os.open(f"/proc/self/fd/{self.number}", flags)
 
     @override
@@ -173,7 +173,9 @@ def outlive_output() -> None:
     """
     for stream in _guarded.values():
         stream.outlive()
-    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # it would stop a background process that writes
+    signal.signal(
+        signal.SIGTTOU, signal.SIG_IGN
+    )  # this signal stops background processes that write
 
 
 def write_notice(text: str) -> None:

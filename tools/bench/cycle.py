@@ -84,7 +84,8 @@ def _ways(out: Output) -> Iterator[tuple[str, dict[str, Way]]]:
         out.note(f"starting {AXES} simulated drives ...")
         simulator = OwnSimulator(winch.profile, str(url), nodes=AXES)
         stack.callback(simulator.stop)
-        # the simulator does the same work for both; on one core no wake-up crosses cores
+        # The simulator does the same work for both ways. On a single core, no wake-up crosses
+        # cores.
         stack.enter_context(one_core(simulator.process.pid))
         heartbeat_s = winch.drive.heartbeat_consumer_s / 4
         clock = stack.enter_context(closing(open_clock([url])))

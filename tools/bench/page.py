@@ -196,7 +196,7 @@ def press_stops(count: int, out: Output) -> Figures:
 def _press(page: Page) -> float:
     """Press the stop button; return when, in s of CLOCK_MONOTONIC."""
     box = page.locator("button.stop").bounding_box()
-    assert box is not None  # it is in sight in every view
+    assert box is not None  # the button is in sight in every view
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
     page.mouse.up()

@@ -73,10 +73,10 @@ def _frames(path: Path) -> Iterator[LogEntry]:
             yield from read_log("standard input", sys.stdin)
         elif path.suffix.lower() in _CANDUMP:
             with os.fdopen(open_regular(path), encoding="ascii", errors="replace") as lines:
-                # a line without end is not a candump line; do not read it as a whole to detect that
+                # An endless line is not a candump line. Do not read the whole line to detect that.
                 yield from read_log(str(path), iter(partial(lines.readline, _MOST_LINE), ""))
         else:
-            if path.suffix.lower() == ".gz":  # it may expand to any amount of data
+            if path.suffix.lower() == ".gz":  # a compressed file may expand to any size
                 raise BadInputError(f"{path}: is compressed; unpack it first")
             os.close(open_regular(path))  # python-can would open a file of any kind
             if path.suffix.lower() == ".blf":
@@ -228,7 +228,7 @@ class Sender:
         """Request power-off of every node that was commanded."""
         asked = []
         for node_id in sorted(self._commanded):
-            # on a lost bus nothing can be sent; its drives miss the master and stop
+            # Nothing can be sent on a lost bus. Its drives miss the master and stop.
             with suppress(OSError):
                 self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
                 asked.append(str(node_id))

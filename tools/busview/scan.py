@@ -89,7 +89,7 @@ class NodeInfo:
         elif sdo.abort_code(data) is not None:
             came = self.answered.get(what, [])
             if any(one[0] >> 5 == sdo.UPLOAD and sdo.expedited(one) is None for one in came):
-                return  # it continues a value in segments, whose first answer has been counted
+                return  # a later segment of a value; its first answer has been counted
         elif data[0] >> 5 != sdo.UPLOAD:
             return
         if self.asked[what]:
@@ -192,7 +192,7 @@ class Scan(BusMember):
             except SdoTimeoutError:
                 continue
             except SdoAbortError:
-                pass  # it has no such object
+                pass  # the node has no such object
             found.answers = True
             return
 

@@ -139,7 +139,7 @@ class PoseOperator:
             self._deadline_s = math.inf
         progress = self._seen["program_progress"]
         with self._trips():
-            robot.wait(SETTLE_S)  # it brakes
+            robot.wait(SETTLE_S)  # the robot brakes
         return _not_reached(directions, place, self.place(), allowed_s, progress)
 
     def wait(self, seconds: float) -> None:

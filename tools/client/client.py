@@ -301,7 +301,7 @@ def _start_stage(robot: str | None, unix: Path | None) -> str | None:
 def _is_alive(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX) as probe:
         probe.settimeout(1.0)
-        # EAGAIN: it runs, but too many connections wait
+        # EAGAIN: the daemon runs, but too many connections wait
         return probe.connect_ex(str(path)) in (0, errno.EAGAIN)
 
 

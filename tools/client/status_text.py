@@ -246,7 +246,10 @@ def _place(progress: dict[str, Any], of: str = "") -> str:
 def stage_text(program: str, progress: dict[str, Any]) -> str:
     """Return the present stage of a program that has stages; empty for others."""
     stage = str(progress.get("stage") or "")
-    if progress.get("was_tight") is False and stage in ("home", "down"):  # it may be standing
+    if progress.get("was_tight") is False and stage in (
+        "home",
+        "down",
+    ):  # the platform may be standing
         return "paying out the cables; a platform that hangs on them comes down"
     if stage == "home" and progress.get("blind"):  # the way there is unknown
         stage = "down"

@@ -388,7 +388,8 @@ class Commissioning:
         both_ways: bool,
     ) -> None:
         """Record the ramps of one bandwidth, method by method."""
-        # the model just identified comes first: it no longer fits once the motor warms up
+        # The model that was just identified comes first, because it no longer fits once the motor
+        # has warmed up.
         for method in ("harmonic", "none", "thesis"):
             name = validation_name(method, wanted_Hz)
             passes = ramps(both_ways)

@@ -297,7 +297,7 @@ def _end(path: Path, loop: LoopFile) -> str:
             raise WorkFailedError(f"{loop.robot}: its loop still runs {end_s:g} s after SIGTERM")
     except PermissionError:
         raise WorkFailedError(f"{loop.robot}: its loop is another user's") from None
-    except (OSError, SharedBlockError):  # it has ended already
+    except (OSError, SharedBlockError):  # the loop has ended already
         pass
     finally:
         os.close(pidfd)

@@ -316,7 +316,7 @@ class Launcher:
 
     def _watch_service_turns(self, service: Child) -> None:
         silent_s, allowed_s = self._silence_s("service_alive_ns"), _SERVICE_STALLED_S
-        if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
+        if not self._block.counters["service_alive_ns"][0]:  # the service has not turned even once
             silent_s, allowed_s = service.idle_s(), _SERVICE_START_S
             loading_s = time.monotonic() - service.started
             if loading_s > _SERVICE_LOADING_S:

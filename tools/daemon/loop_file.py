@@ -202,7 +202,7 @@ class LauncherLock:
     def _remove_loop_file(self, socket: Path) -> None:
         """Remove the file of a killed loop; refuse if the loop runs and only its lock is gone."""
         path = LoopFile.beside(socket)
-        with suppress(WorkFailedError):  # it does not exist or is not trusted
+        with suppress(WorkFailedError):  # the file does not exist or is not trusted
             if LoopFile.read(path).runs():
                 os.close(self.fd)
                 raise _taken(socket, None)

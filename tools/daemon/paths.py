@@ -105,7 +105,7 @@ def _find(robot: str | None, suffix: str) -> list[Path]:
             found += sorted(
                 path for path in files if path.suffix == suffix and robot in (None, path.stem)
             )
-        except OSError:  # this user may not read it
+        except OSError:  # this user may not read the folder
             continue
     return found
 

@@ -125,7 +125,7 @@ def _identification() -> None:
         angle = np.linspace(0.0, 4.0 * speed, 4001)
         run = windows.SweepData(time_s, angle, np.zeros(4001), angle, np.full(4001, speed))
         cut = windows.cut(run, 0.0)
-        assert cut is not None  # it lasts long enough
+        assert cut is not None  # the run lasts long enough
         windows.matrix(cut, windows.ColumnLayout((1, 4), windows.STARTS[0]), 0, 2)
         rows = np.zeros(1, np.int64)
         windows.average_by_sign(cut.angle_rad, cut, rows, np.zeros((1, 2)))
@@ -159,7 +159,7 @@ def _planning() -> None:
     assert timed is not None  # a few centimetres beside home
     first_fault(model, timed.samples, timed.period_s)
     stored = timed.samples.copy()
-    stored.flags.writeable = False  # as a plan is that the loop reads from its file
+    stored.flags.writeable = False  # as in a plan that the loop reads from its file
     first_fault(model, stored, timed.period_s)
     Reach(model).draw(1, 1)
     statics = statics_of(robot)

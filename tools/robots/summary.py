@@ -265,7 +265,7 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     if figures["loop"] is not None:
         lines += _loop_lines(figures["loop"])
     turns = figures.get("turns_at_most_rad", 0.0)
-    if turns != 0.0:  # it is 0 for a point
+    if turns != 0.0:  # the angle is 0 for a point
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
         lines.append(f"           it {turning} there, which no cable can prevent")
         lines += _free_rotation_lines(figures["free_rotation"])
