@@ -73,7 +73,7 @@ class PythonCanAdapter:
         except Exception as error:
             # vendors' modules raise any exception, such as NameError if their library is missing
             if isinstance(error.__cause__, BusError):
-                raise error.__cause__ from None  # its text already names the bus
+                raise error.__cause__ from None  # the cause's text already names the bus
             reason = str(error) or type(error).__name__
             if isinstance(error, NameError):
                 reason = f"the vendor's library for {url.interface} is missing ({error})"
@@ -192,7 +192,7 @@ class SharedAdapter:
             except BlockingIOError:
                 port.health.note_rx_lost("frames came faster than they were read", len(batch))
             except OSError:
-                continue  # it is about to be removed
+                continue  # the port is about to be removed
 
     def _route(self, can_id: int) -> tuple[AdapterPort, ...]:
         with self._lock:

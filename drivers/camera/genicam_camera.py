@@ -119,7 +119,7 @@ class GenicamCamera(Camera):
 
     def close(self) -> None:
         """See `Camera.close`."""
-        with suppress(Exception):  # it may be gone already
+        with suppress(Exception):  # the camera may be gone already
             self._acquirer.stop()
             self._acquirer.destroy()
         self._harvester.reset()

@@ -363,7 +363,7 @@ class CanNetwork(BusMember):
             if state_of(self.read_int(node_id, 0x6041)) in POWER_OFF:
                 return True
         except SdoError:
-            pass  # it does not answer SDO either
+            pass  # the drive does not answer SDO either
         self.reset(node_id)
         return False
 

@@ -264,7 +264,8 @@ class RobotMachine:
     def acknowledge(self) -> None:
         """Acknowledge a trip of the safety I/O whose cause is gone."""
         if self._safety is not None and self._safety.fault():
-            self._safety.io.de_energise()  # it can be acknowledged only while it does not monitor
+            # a trip can be acknowledged only while the safety I/O does not monitor
+            self._safety.io.de_energise()
             self._safety.io.acknowledge()
 
     @_as_machine_error
