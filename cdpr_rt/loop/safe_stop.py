@@ -228,7 +228,8 @@ class SafeStop:
         assert lowering is not None  # this method requires a platform to lower
         if not self.without_pose:
             self.without_pose = True
-            self._note_fall()  # it falls without drives, and no sensor measures where it lands
+            # without drives the platform falls, and no sensor measures where it lands
+            self._note_fall()
             self._engine.switch(lowering.program, {"blind": True})
 
     def enter_fault(self) -> None:

@@ -30,7 +30,7 @@ def listen_unix(path: Path) -> socket.socket:
             if listener_pid(path) is not None:
                 raise ListenError(f"socket {path}: another daemon listens there")
             path.unlink()
-    except OSError as error:  # it belongs to another user, in a folder that all users may write to
+    except OSError as error:  # the socket is another user's, in a folder for all users
         raise ListenError(f"socket {path}: {error.strerror or error}") from None
     listener = socket.socket(socket.AF_UNIX)
     mask = os.umask(0o177)

@@ -306,7 +306,7 @@ class ProcedureRunner:
         self._result = None
         process = self._process = await asyncio.create_subprocess_exec(
             *command,
-            stdin=asyncio.subprocess.PIPE,  # it ends with this pipe, even if this process dies
+            stdin=asyncio.subprocess.PIPE,  # a command ends with this pipe, even if we die
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
             env={**os.environ, variable: self._lent or self._token},
