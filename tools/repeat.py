@@ -142,9 +142,10 @@ def run_once(
 ) -> Run:
     """Run `command` in a new folder in `folder`, with its simulators' frames logged.
 
-    `command` has the words after `cdpr`, or a program given by its path. `stops` and this number of
-    `busy` processes delay it. Raises BadInputError if it cannot be run, WorkFailedError
-    if it ends early; no process of the run remains in any case.
+    `command` has the words after `cdpr`, or a program given by its path. Two things delay it:
+    `stops` stops its processes for a while, and `busy` other processes use the processors. Raises
+    BadInputError if it cannot be run, WorkFailedError if it ends early; no process of the run
+    remains in any case.
     """
     place = folder / f"run-{number}"
     work, output = place / "files", place / "output.txt"

@@ -669,7 +669,7 @@ class FreeRotation:
     """Amplitude of an anchor point."""
 
     def lasts_s(self, amplitude_m: float) -> float:
-        """Return how long anchor points swing by more than an amplitude after such a move."""
+        """Return how long a swing of `swing_m` takes to fade to `amplitude_m`, s."""
         if self.swing_m <= amplitude_m:
             return 0.0
         rate_1_s = rotation_kernel.DAMPING_RATIO * math.tau * self.slowest_Hz

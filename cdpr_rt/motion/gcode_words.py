@@ -264,7 +264,9 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
         if match[2] and _EXPONENT.match(line, at):
             whole = line[match.start() :].split(maxsplit=1)[0]
             findings.refuse(
-                number, f"{whole[:20]}: allowed: numbers without exponent; a space before a word E"
+                number,
+                f"{whole[:20]}: a number must have no exponent; "
+                "if E is a word, write a space before it",
             )
             return None
         value = float(match[2]) if match[2] else math.nan

@@ -3,13 +3,13 @@
 In addition to the known wrench, the cables exert F = D (ė + M^-1 D e/(4 ζ²)) and an integral part.
 This is a loop of damping ratio ζ in each mode of the platform. Its bandwidth is ω, or less where
 the damping would exceed c at the cables: D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1. The proportional
-part is saturated, the damping is not. So far from its target the platform returns at the speed at
-which both parts are equal. The integral part has a deadband for errors that friction can explain,
-so that the platform stands still at its target. A sigmoid leads into the deadband, with hysteresis
-as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error. At rest, the integral part
-grows against friction of unknown sign. In motion, friction is compensated, so this growth is
-removed when motion begins, up to the friction. Otherwise the platform would jump in directions in
-which friction is large relative to the loop's stiffness.
+part is saturated, the damping is not. Therefore, if the platform is far from its target, it returns
+at the speed at which both parts are equal. The integral part has a deadband for errors that
+friction can explain, so that the platform stands still at its target. A sigmoid leads into the
+deadband, with hysteresis as in Tremblay (thesis), fig. 2.3: leaving it takes twice the error. At
+rest, the integral part grows against friction of unknown sign. In motion, friction is compensated,
+so this growth is removed when motion begins, up to the friction. Otherwise the platform would jump
+in directions in which friction is large relative to the loop's stiffness.
 
 Arrays besides those of the kinematics' kernels: a loop's row of SETTINGS, and its STATE: the
 integral part (d,), N and Nm; then the share of its rate that the deadband leaves, 0 to 1; the twist

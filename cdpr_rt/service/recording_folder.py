@@ -125,5 +125,6 @@ async def _pieces_of(
     text = (await process.stderr.read(_MOST_TEXT)).decode("utf-8", "replace").strip()
     if await process.wait():
         # after the first output only the end of the connection can show the failure
-        why = brief(text.splitlines()[-1] if text else "out of memory? choose less", _MOST_TEXT)
+        unknown = "out of memory? choose fewer fields or a shorter time"
+        why = brief(text.splitlines()[-1] if text else unknown, _MOST_TEXT)
         raise ValueError(why) if not any_output else ConnectionError(why)

@@ -156,7 +156,8 @@ async def _read(
     except ValueError as error:
         raise HTTPException(422, str(error)) from None
     except TimeoutError:
-        raise HTTPException(422, f"not read within {READING_S:g} s; choose less") from None
+        fix = "choose fewer fields or a shorter time"
+        raise HTTPException(422, f"not read within {READING_S:g} s; {fix}") from None
 
     async def all_pieces() -> AsyncIterator[bytes]:
         yield first

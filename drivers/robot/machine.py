@@ -121,12 +121,11 @@ def _as_machine_error(
 class RobotMachine:
     """All axes of `robot` on the buses given with --bus; implements `Machine`.
 
-    Power is possible only while the `safety_io` allows it. By default it is that of the robot,
-    unless all buses are simulated. Tensions are measured if `tension_port` names the port of their
-    sensors. Simulated buses in lockstep run as fast as they can; with `real_time`, no faster than
-    wall time.
-    If `optional` is set, non-mandatory axes that do not boot are left out.
-    By default its `limits` are those of its file.
+    Power is possible only while the safety I/O allows it. The default of `safety_io` is that of the
+    robot's file, or none if all buses are simulated. Tensions are measured if `tension_port` names
+    the port of their sensors. Simulated buses in lockstep run as fast as they can; with
+    `real_time`, no faster than wall time. If `optional` is set, non-mandatory axes that do not boot
+    are left out. By default its `limits` are those of its file.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)

@@ -69,8 +69,9 @@ def bus_counts(session: Session) -> dict[str, dict[str, Any]]:
 def compare(
     name: str, session: Session, before: Mapping[str, Any], after: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Check the master's work on a bus between two counts against the bus' own counts.
+    """Compare the frames that the master should have exchanged on a bus with the counts of the bus.
 
+    `before` and `after` are the counts at the begin and the end of the compared interval.
     `overruns` are cycles whose frames did not fit into the bus time between two SYNCs. `tolerance`
     is the number of heartbeats that may fall just inside or outside the interval. `lost` is the
     number of frames that one side has sent and the other has not seen.

@@ -202,7 +202,7 @@ def import_(
     """Write a robot's file from a CASPR model.
 
     Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
-    The platform's origin is its centre of mass, and the plane of a planar robot vertical, with y
+    The platform's origin is its centre of mass. The plane of a planar robot is vertical, with y
     upward. If the robot cannot work with its winches, the file
     is written anyway, and you can edit it.
     """

@@ -96,7 +96,7 @@ def _stop_socket(path: Path) -> StopSocket:
         return StopSocket(path)
     except OSError as error:
         reason = error.strerror or error
-        raise ControlError(f"{path}: cannot be bound, for stops: {reason}") from None
+        raise ControlError(f"{path}: cannot create the socket for stops: {reason}") from None
 
 
 def _lengths_file(robot: Robot, settings: RunSettings) -> Path | None:

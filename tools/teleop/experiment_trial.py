@@ -417,7 +417,8 @@ def _points_of_path(recorded: Recorded, path: dict[str, Any]) -> Points:
     entries = path["points"]
     if len(found) != len(entries):
         raise WorkFailedError(
-            f"{recorded.folder}: {len(found)} confirmations recorded, but {len(entries)} given"
+            f"{recorded.folder}: the cycles contain {len(found)} confirmed targets, "
+            f"but the events list {len(entries)}"
         )
     plane = list(plane_of(recorded.directions.k))
     looks = [[recorded.row(cycle) for cycle in entry["look_cycles"]] for entry in entries]

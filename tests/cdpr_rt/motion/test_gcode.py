@@ -124,7 +124,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: allowed: one"),
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
         (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
-        (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: allowed: numbers without exponent"),
+        (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: a number must have no exponent"),
         (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: give P or S, and no axes"),
         (["G0 X0 Y0 Z0", "G80", "X5"], ROOM, r":3: .* without a motion after G80"),
         (["G0 X0 Y0 Z0", "F60 G93", "G1 X5"], ROOM, r":3: G1 without a feed; .* in the same line"),
