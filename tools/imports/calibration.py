@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,8 +25,10 @@ from cdpr_tools.imports.mapping import (
     LENGTHS,
     NUMBERS,
     CalibrationMapping,
+    Column,
     PoseColumns,
     read_time,
+    shifted,
     usable,
 )
 from cdpr_tools.imports.tables import Table
@@ -152,16 +155,27 @@ def _read_cables(
             )
     table = usable(table, columns.time, (*columns.lengths, *columns.tensions), notes)
     time = read_time(columns.time, table)
-    lengths = np.column_stack([one.read_all(table, LENGTHS) for one in columns.lengths])
-    if not columns.tensions:
-        return time, lengths, None
-    return time, lengths, np.column_stack([c.read_all(table, FORCES) for c in columns.tensions])
+
+    def values(some: Sequence[Column], units: Mapping[str, float]) -> FloatArray:
+        each = (
+            shifted(time, one.read_all(table, units), one.late_by_s(columns.time)) for one in some
+        )
+        return np.column_stack(list(each))
+
+    lengths = values(columns.lengths, LENGTHS)
+    return time, lengths, values(columns.tensions, FORCES) if columns.tensions else None
 
 
 def read_poses(table: Table, columns: PoseColumns) -> Poses:
     """Return the poses in the room; skip rows with an empty cell, where the body was hidden."""
     table = usable(table, columns.time, (), [])
     time = read_time(columns.time, table)
+    turning = (*(columns.quaternion or ()), *(columns.rotation_vector or ()))
+    late_s = {one.late_by_s(columns.time) for one in (*columns.position, *turning)}
+    if len(late_s) > 1:
+        problem = f"values {sorted(late_s)}; allowed: the same for all columns of a pose"
+        raise ProfileError(table.path, "pose: time_offset_s", problem)
+    time = time + late_s.pop()
     to_room = _to_room(table, columns)
     position = np.column_stack([one.read(table, LENGTHS) for one in columns.position])
     seen = np.isfinite(position).all(axis=1)

@@ -62,6 +62,15 @@ class Column(Profile):
             raise table.fault(self.name, row, "is empty; allowed: a number in every row")
         return values
 
+    def late_by_s(self, time: Column) -> float:
+        """Return the time of the values minus the times that the column `time` gives."""
+        return self.time_offset_s - time.time_offset_s
+
+
+def shifted(time: FloatArray, values: FloatArray, by_s: float) -> FloatArray:
+    """Return values that belong to times later by `by_s`, interpolated at the times of the rows."""
+    return np.interp(time, time + by_s, values) if by_s else values
+
 
 def usable(table: Table, time: Column | None, needed: Iterable[Column], notes: list[str]) -> Table:
     """Return the rows with a number in each needed column, and with increasing times.

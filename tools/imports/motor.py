@@ -26,7 +26,14 @@ from cdpr_rt.identification.windows import SweepData
 from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.imports.logs import read_any
-from cdpr_tools.imports.mapping import MotorColumns, MotorMapping, motor_units, read_time, usable
+from cdpr_tools.imports.mapping import (
+    MotorColumns,
+    MotorMapping,
+    motor_units,
+    read_time,
+    shifted,
+    usable,
+)
 from cdpr_tools.imports.tables import Table
 
 _LONGEST_STEP_S: Final = 2.5e-3
@@ -116,9 +123,10 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
     time = read_time(columns.time, table)
     angle = columns.angle.read_all(table, angles)
     torque = columns.torque.read_all(table, torques)
-    base = columns.time.time_offset_s
-    angle = _shifted(time, angle, columns.angle.time_offset_s - base)
-    torque = _shifted(time, torque, columns.torque.time_offset_s - base)
+    if np.ptp(angle) <= math.tau:  # an angle that begins again after each turn
+        angle = np.unwrap(angle)
+    angle = shifted(time, angle, columns.angle.late_by_s(columns.time))
+    torque = shifted(time, torque, columns.torque.late_by_s(columns.time))
     inside = np.flatnonzero((time >= mapping.from_s) & (time <= mapping.until_s))
     if inside.size < _FEWEST_SAMPLES:
         problem = (
@@ -126,8 +134,6 @@ def _pieces(table: Table, mapping: MotorMapping, winch: Winch, notes: list[str])
         )
         raise ProfileError(table.path, "", problem)
     time, angle, torque = time[inside], angle[inside], torque[inside]
-    if np.ptp(angle) <= math.tau:  # an angle that begins again after each turn
-        angle = np.unwrap(angle)
     _require_plausible(table, columns, time, angle, torque, winch)
     found = []
     for start, stop in _one_way(angle):
@@ -170,11 +176,6 @@ def _require_plausible(
     if np.ptp(torque) == 0.0:
         problem = f"column {columns.torque.name!r}: {torque[0]:g} Nm in all rows; choose another"
         raise ProfileError(table.path, "", problem)
-
-
-def _shifted(time: FloatArray, values: FloatArray, by_s: float) -> FloatArray:
-    """Return values that belong to times later by `by_s`, interpolated at the times of the rows."""
-    return np.interp(time, time + by_s, values) if by_s else values
 
 
 def _one_way(angle: FloatArray) -> list[tuple[int, int]]:

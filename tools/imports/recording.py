@@ -29,6 +29,7 @@ from cdpr_tools.imports.mapping import (
     RecordingMapping,
     motor_units,
     read_time,
+    shifted,
     speed_units,
 )
 from cdpr_tools.imports.tables import Table
@@ -128,8 +129,7 @@ def _fill_axes(
             raise ProfileError(table.path, f"cables.{kind}", problem)
         for k, (column, axis) in enumerate(zip(given, robot.axes, strict=bool(given))):
             values = column.read(table, _units(kind, axis.winch))
-            if by_s := column.time_offset_s - columns.time.time_offset_s:
-                values = np.interp(time, time + by_s, values)
+            values = shifted(time, values, column.late_by_s(columns.time))
             rows[field][:, k] = values[chosen]
     rows["valid"] = np.isfinite(rows["position_rad"])
 

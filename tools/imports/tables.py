@@ -46,6 +46,7 @@ _UNITS: Final = frozenset((
     "deg/s", "rpm", "hz",
 ))  # fmt: skip
 """Units in a line below the names, in lower case."""
+_QUATERNION: Final = "Quaternion"
 _LENGTHS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 
@@ -316,14 +317,20 @@ def _read_optitrack(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     bodies, kinds, axes = named[0], head[-2], head[-1]
     names, units = [], {}
     facts = dict(zip(head[0][::2], head[0][1::2], strict=False))
-    length = _LENGTHS.get(facts.get("Length Units", "Meters").lower(), "m")
+    stated = facts.get("Length Units", "Meters")
+    length, kind = _LENGTHS.get(stated.lower(), stated), facts.get("Rotation Type", _QUATERNION)
+    faults: dict[str, ProfileError] = {}
     for j, axis in enumerate(axes):
         above = [part[j] for part in (bodies, kinds) if j > 1 and j < len(part) and part[j]]
         name = " ".join([*above, axis]) if j > 1 else (TIME if j == 1 else axis)
         names.append(name)
         if "Position" in above:
             units[name] = length
-    return _table(path, digest, names, rows, units | {TIME: "s"})
+        elif "Rotation" in above and kind != _QUATERNION:
+            problem = f"has Euler angles ({kind}); export from Motive with quaternions"
+            faults[name] = ProfileError(path, name, problem)
+    table = _table(path, digest, names, rows, units | {TIME: "s"})
+    return replace(table, faults=table.faults | faults)
 
 
 def _read_vicon(path: Path, rows: Iterator[_Row], digest: str) -> Table:

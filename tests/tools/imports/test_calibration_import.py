@@ -88,6 +88,24 @@ def test_poses_are_interpolated_at_the_times_of_the_lengths(tmp_path: Path) -> N
     assert (seen.tension_N == 50.0).all()
 
 
+@pytest.mark.parametrize("late", ["poses", "lengths"])
+def test_a_time_offset_of_the_columns_corrects_the_clock(tmp_path: Path, late: str) -> None:
+    files = recorded(tmp_path)
+    mapping = MAP.replace(", offset = -1.812", "")
+    if late == "poses":
+        for axis in "XYZ":
+            mapping = mapping.replace(
+                f'Position {axis}"', f'Position {axis}", time_offset_s = -1.812'
+            )
+    else:
+        mapping = mapping.replace('", unit = "mm"', '", unit = "mm", time_offset_s = 1.812')
+    files[2].write_text(mapping)
+    result = run(tmp_path, files)
+    assert result.returncode == 0, result.stderr
+    seen = load_data(tmp_path / "out" / "data.json").observations(load_robot(ROBOT), MODEL)
+    assert np.abs(seen.length_m - cable_lengths_m(seen.start[:, 0, :2])).max() < 1e-4
+
+
 def test_a_recording_that_does_not_begin_at_home_names_the_home_to_write(tmp_path: Path) -> None:
     result = run(tmp_path, recorded(tmp_path, MODEL.home[:2] + np.array([0.25, 0.0])))
     assert result.returncode == 2
@@ -130,6 +148,7 @@ def test_a_quaternion_of_zeros_counts_as_a_hidden_body(tmp_path: Path) -> None:
     [
         ("-1.812", "100.0", "s to `offset`"),
         ("rate_Hz = 50", "from_s = 9.0", "0 rows lie within the time of the poses"),
+        ('Position X"', 'Position X", time_offset_s = 0.01', "the same for all columns of a pose"),
         ('"z", "y", "-x"', '"z", "y", "x"', "a right-handed frame"),
         ('"z", "y", "-x"', '"z", "up", "x"', "pose.axes[1]: value 'up'; allowed: x, y, z"),
         (', { name = "l3", unit = "mm" }]', "]", "cables.lengths: 2 columns; allowed: 3"),

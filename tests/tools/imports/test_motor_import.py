@@ -183,11 +183,16 @@ def test_rows_with_an_empty_cell_or_out_of_order_are_left_out_with_a_note(
     assert f"left out 1 of {count - 3} rows whose time does not increase" in told
 
 
-def test_an_angle_that_begins_again_after_each_turn_is_unwrapped(tmp_path: Path) -> None:
+@pytest.mark.parametrize("late_s", [0.0, 0.005])
+def test_an_angle_that_begins_again_after_each_turn_is_unwrapped(
+    tmp_path: Path, late_s: float
+) -> None:
+    angle = f'angle = {{ name = "phi", unit = "deg", time_offset_s = {late_s} }}'
     time = np.arange(0.0, 20.0, 0.01)
     rows = [f"{1e3 * t},{(50.0 * t) % 360.0},{0.1 + 0.01 * np.sin(t)}" for t in time]
     (tmp_path / "a.csv").write_text("\n".join(["t,phi,iq", *rows]))
-    (only,) = imported(tmp_path / "out", mapping(tmp_path), tmp_path / "a.csv")["passes"]
+    at = mapping(tmp_path, angle=angle)
+    (only,) = imported(tmp_path / "out", at, tmp_path / "a.csv")["passes"]
     assert only["turns"] == pytest.approx(20.0 * 50.0 / 360.0, abs=0.01)
 
 

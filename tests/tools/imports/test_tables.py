@@ -56,6 +56,16 @@ def test_an_optitrack_export_has_columns_by_body_and_axis(tmp_path: Path) -> Non
     assert table.units["Platform Position X"] == "mm"
 
 
+def test_other_units_and_euler_angles_of_an_optitrack_export_are_not_misread(
+    tmp_path: Path,
+) -> None:
+    text = OPTITRACK.replace("Millimeters", "Inches").replace("Type,Quaternion", "Type,XYZ")
+    table = read_table(written(tmp_path, text))
+    assert table.units["Platform Position X"] == "Inches"
+    with pytest.raises(ProfileError, match=r"Platform Rotation W: has Euler angles \(XYZ\)"):
+        table.column("Platform Rotation W")
+
+
 def test_a_vicon_export_has_columns_by_body_and_time_from_frames(tmp_path: Path) -> None:
     table = read_table(written(tmp_path, VICON))
     assert table.column("time_s") == pytest.approx([0.10, 0.11])
