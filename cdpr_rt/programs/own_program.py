@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import inspect
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
@@ -219,14 +220,24 @@ def checked_programs(found: Iterable[tuple[str, Any]], taken: Iterable[str]) -> 
             raise CodeError(f"{reference}: name: {name!r}; allowed: small letters, digits, -, _")
         if name in names:
             raise CodeError(f"{reference}: name: {name!r} is taken; allowed: another name")
-        for key, bounds in program.arguments.items():
-            three = tuple(np.atleast_1d(bounds))
-            low, high, default = (*three, *[np.nan] * 3)[:3]
-            if not _KEY.fullmatch(key) or len(three) != 3 or not low <= default <= high:
+        arguments: Any = program.arguments
+        if not isinstance(arguments, Mapping):
+            raise CodeError(f"{reference}: arguments: {arguments!r}; give a dictionary")
+        for key, bounds in arguments.items():
+            if not (isinstance(key, str) and _KEY.fullmatch(key) and _are_bounds(bounds)):
                 raise CodeError(
                     f"{reference}: arguments: {key!r}: {bounds!r}; use letters, digits and _ for "
-                    "the name, and give three numbers: lowest, highest, default"
+                    "the name, and give three finite numbers: lowest, highest, default"
                 )
         names.add(name)
         programs.append(program)
     return programs
+
+
+def _are_bounds(given: Any) -> bool:
+    """Whether these are three finite numbers: lowest, highest, default."""
+    try:
+        low, high, default = map(float, given)
+    except (TypeError, ValueError):
+        return False
+    return -math.inf < low <= default <= high < math.inf

@@ -154,6 +154,11 @@ class Named(Swing):
         (Named("other", {"x-y": (0.0, 1.0, 0.5)}), "mine: arguments: 'x-y'"),
         (Named("other", {"x": (0.0, 1.0)}), "mine: arguments: 'x': .*lowest, highest, default"),
         (Named("other", {"x": (0.0, 1.0, 2.0)}), "mine: arguments: 'x'"),
+        (Named("other", {"x": ("a", "c", "b")}), "mine: arguments: 'x'"),
+        (Named("other", {"x": [[1.0], [2.0, 3.0]]}), "mine: arguments: 'x'"),
+        (Named("other", {"x": (0.0, float("inf"), 1.0)}), "mine: arguments: 'x': .*three finite"),
+        (Named("other", {5: (0.0, 1.0, 0.5)}), "mine: arguments: 5"),
+        (Named("other", ["x"]), r"mine: arguments: \['x'\]; give a dictionary"),
     ],
 )
 def test_an_unsuitable_program_is_named_with_its_reference(program: object, text: str) -> None:
