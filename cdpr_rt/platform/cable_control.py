@@ -468,7 +468,7 @@ class CableControl(PlaceChecks):
             carried = solver.solve(self._W, wrench, tension_N) <= TensionOutcome.SUBSTITUTED
             if self._own_distribution is not None and carried:
                 self._own_distribution.solve(self._W, wrench, last_N, tension_N)
-            return tension_N
+            return tension_N.copy()  # two calls in a cycle may be compared
 
         last_N = np.array(self.tension_N)
         state = State(

@@ -78,6 +78,8 @@ def test_a_controller_distributes_by_the_robots_distribution(planar_file: Path) 
     class Holding(cdpr.Controller):
         def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
             error = target.position - state.position
+            at_rest, pushing = map(state.distribute, np.array([[0.0, 0.0], [0.0, 5.0]]))
+            assert (at_rest != pushing).any()
             return state.distribute(1500.0 * error + 60.0 * (target.velocity - state.velocity))
 
     mine = Spread()
