@@ -198,10 +198,10 @@ class Robot:
     the robot return when the motion is done. They raise Refused before anything moves, Faulted if a
     fault removes the power, and MotionEnded if another client ends the motion. Ctrl-C stops a
     motion and holds the robot until the `with` block closes the handle. Without such a block, as in
-    a notebook, Ctrl-C in a motion or `wait` lowers the platform and removes the power.
+    a notebook, Ctrl-C in a motion, `wait` or `observe` lowers the platform and removes the power.
     """
 
-    def __init__(self, backend: Backend) -> None:
+    def __init__(self, backend: Backend, *, in_block: bool = False) -> None:
         self._backend = backend
         description = backend.description
         self.name = str(description["robot"])
@@ -214,8 +214,8 @@ class Robot:
         self._k = len(platform.get("home_m", ()))
         self._started = ""
         """Name of the program that this handle has started and that is not done yet."""
-        self._in_block = False
-        """Whether a `with` block closes the handle after a Ctrl-C."""
+        self._in_block = in_block
+        """Whether a block closes the handle after a Ctrl-C, so that a motion is only held."""
         self._c = len([name for name in platform.get("controlled", ()) if name in _ANGLES])
 
     def __enter__(self) -> Self:
@@ -340,9 +340,9 @@ class Robot:
         by default all fields. A simulation keeps the last 5 minutes. A daemon's rows come from its
         recording on this machine. Raises Error if the daemon records nothing.
         """
-        if unknown := set(fields) - FIELDS.keys():
-            raise InvalidArgument(f"fields: {sorted(unknown)}; allowed: {', '.join(FIELDS)}")
-        log = self._backend.log(fields or tuple(FIELDS)).view(Log)
+        if unknown := [name for name in fields if not isinstance(name, str) or name not in FIELDS]:
+            raise InvalidArgument(f"fields: {unknown}; allowed: {', '.join(FIELDS)}")
+        log = self._backend.log(tuple(dict.fromkeys(fields or FIELDS))).view(Log)
         log.axes = self.axes
         return log
 
@@ -583,9 +583,11 @@ class Robot:
         A daemon sends some 50 per second, with only `time_s`, `position_rad`, `cable_length_m` and
         `tension_N`.
         """
-        seconds, powered = _duration(seconds), self.state == "active"
-        rows = self._backend.observe(seconds)
-        self._require_power(powered, self._look())
+        seconds = _duration(seconds)
+        with _HeldOnError(self):
+            powered = self.state == "active"
+            rows = self._backend.observe(seconds)
+            self._require_power(powered, self._look())
         return rows
 
     def wait_until_done(self) -> None:
@@ -602,17 +604,19 @@ class Robot:
         if (trouble := progress.get("trouble")) and self.on_status is None:
             warnings.warn(str(trouble), RuntimeWarning, stacklevel=_level_of_script())
 
-    def inject_fault(self, axis: str | int, fault: str, value: int | None = None) -> None:
+    def inject_fault(
+        self, axis: str | int | np.integer[Any], fault: str, value: int | None = None
+    ) -> None:
         """Inject a fault into a simulated axis, given by name or index from 0; "mend" repairs it.
 
         Faults and values are those of `cdpr sim fault`, such as "drive-fault" and "cut-cable".
         """
         if isinstance(axis, str) and axis in self.axes:
             axis = self.axes.index(axis)
-        if not isinstance(axis, int) or not 0 <= axis < len(self.axes):
+        if not isinstance(axis, int | np.integer) or not 0 <= axis < len(self.axes):
             names = ", ".join(map(repr, self.axes))
             raise InvalidArgument(f"axis: {axis!r}; allowed: 0 to {len(self.axes) - 1}, or {names}")
-        self._backend.inject_fault(axis, fault, value)
+        self._backend.inject_fault(int(axis), fault, value)
 
     # -- helpers
 

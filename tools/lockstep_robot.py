@@ -573,7 +573,10 @@ class LockstepRobot:
         folder = self.folder / "paths"
         paths.open(folder)
         lines = plan.nodes.line[plan.timed.node]
-        return write_plan(folder, plan.timed, lines, file.name, shown.planner.model)
+        try:
+            return write_plan(folder, plan.timed, lines, file.name, shown.planner.model)
+        except ControlError as error:
+            raise Refused(str(error)) from None
 
     @contextmanager
     def open_stream(self) -> Iterator[Callable[[Sequence[float], float], None]]:

@@ -18,6 +18,8 @@ from daemon_rig import PATIENCE_S, RealDaemon, alive, until, write_robot
 
 import cdpr_rt as cdpr
 from cdpr_rt.arrays import FloatArray
+from cdpr_tools.client.client import open_daemon
+from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.daemon.loop_file import LoopFile, launcher_pid
 from cdpr_tools.daemon.paths import find_launcher_files, find_sockets
 
@@ -65,6 +67,26 @@ def test_a_second_script_is_rejected_while_the_first_has_the_right_to_move(
             second.turn_by([0.1, 0.1])
         robot.close()
         second.turn_by([0.1, 0.1])
+
+
+def test_a_path_file_that_is_not_text_is_rejected(robot: cdpr.Robot, tmp_path: Path) -> None:
+    file = tmp_path / "points.csv"
+    file.write_bytes(b"\xff\xfe")
+    with pytest.raises(cdpr.Refused, match=r"points\.csv: is not UTF-8 text"):
+        robot.follow(file)
+
+
+def test_ctrl_c_in_a_command_that_only_watches_leaves_the_power_on(
+    robot: cdpr.Robot, daemon: RealDaemon
+) -> None:
+    with (
+        open_daemon(None, daemon.socket, None, None) as opened,
+        pytest.raises(KeyboardInterrupt),
+        commanded(opened) as watching,
+    ):
+        Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        watching.wait(PATIENCE_S)
+    assert robot.state == "active"
 
 
 def test_a_hold_by_another_client_ends_the_motion(robot: cdpr.Robot, daemon: RealDaemon) -> None:
@@ -184,6 +206,8 @@ def test_real_drives_are_not_started_without_consent(tmp_path: Path) -> None:
     robot = write_robot(tmp_path)
     with pytest.raises(cdpr.InvalidArgument, match="can0 will move; give yes=True"):
         cdpr.run(robot, bus="can0=socketcan:can0")
+    with pytest.raises(cdpr.InvalidArgument, match="unknown interface 'nonsense'"):
+        cdpr.run(robot, bus="nonsense:")
     command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run", str(robot), "--no-record"]
     options = ["--bus", "can0=slcan:/dev/no-adapter", "--socket", str(tmp_path / "one.sock")]
     with subprocess.Popen(

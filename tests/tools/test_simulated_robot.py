@@ -138,6 +138,11 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
         with pytest.raises(cdpr.InvalidArgument, match=r"position_m: .*; allowed: texts, finite"):
             robot.run("pose", position_m=wrong)
     robot.run("pose", position_m=robot.position_m)  # an array is a list of numbers
+    for wrong in ("pos", ["time_s", "pose"]):
+        with pytest.raises(cdpr.InvalidArgument, match=r"fields: \[.*\]; allowed: cycle, time_s"):
+            robot.log(wrong)
+    assert robot.log("pose", "time_s", "pose").dtype.names == ("pose", "time_s")
+    robot.inject_fault(np.argmin(robot.tension_N), "mend")
 
 
 def interrupt_turn(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
@@ -157,9 +162,10 @@ def interrupt_turn(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
     [
         lambda robot: robot.wait_until_done(),
         lambda robot: robot.wait(5.0),
+        lambda robot: robot.observe(0.5),
         lambda robot: robot.move_to([0.0, 2.1], speed_m_s=0.05, wait=False),
     ],
-    ids=["wait_until_done", "wait", "start"],
+    ids=["wait_until_done", "wait", "observe", "start"],
 )
 def test_ctrl_c_holds_a_motion_which_can_be_resumed(
     robot: cdpr.Robot, monkeypatch: pytest.MonkeyPatch, wait: Callable[[cdpr.Robot], None]

@@ -132,7 +132,10 @@ def _asking(
         answer = measured(by_cables)
         if answer is None:
             return
-        position = np.asarray(answer, float)
+        try:
+            position = np.asarray(answer, float)
+        except (TypeError, ValueError):
+            position = np.array(np.inf)
         if position.shape != (k,) or np.isinf(position).any():
             raise InvalidArgument(f"measured: returned {answer!r}; allowed: {k} numbers in m")
         file.add(pose, [*(1e3 * position), 1e3 * std_m])

@@ -23,6 +23,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row, cycle_dtype
+from cdpr_rt.errors import ControlError
 from cdpr_rt.robot import (
     AlreadyRunning,
     Error,
@@ -124,7 +125,13 @@ def run(
     _require_no_daemon(str(robot))
     buses = _texts("bus", bus or ())
     with _errors_of_opening():
-        real = real_buses(load_robot(robot), buses)
+        profile = load_robot(robot)
+        try:
+            real = real_buses(profile, buses)
+        except DriverError as error:
+            if not buses:  # those of the file
+                raise
+            raise InvalidArgument(str(error).replace("--bus", "bus")) from None
     if real and not yes:
         where = " and ".join(real)
         raise InvalidArgument(f"yes: False; real motors on {where} will move; give yes=True")
@@ -181,7 +188,7 @@ def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
         try:
             if in_control:
                 backend.take_right()
-            yield Robot(backend)
+            yield Robot(backend, in_block=True)
         finally:
             if in_control:
                 backend.close()
@@ -363,8 +370,14 @@ class _Remote:
         raise Error("true_pose: available only from simulate()")
 
     def plan(self, file: Path) -> str:
+        # imported here: it uses this module
+        from cdpr_tools.client.path_following import path_source  # noqa: PLC0415
+
+        try:
+            body = path_source(file)
+        except (ProfileError, ControlError) as error:
+            raise Refused(str(error)) from None
         with self._errors():
-            body = {"name": file.name, "text": file.read_text(encoding="utf-8")}
             number = self._daemon.post("/path", body)["number"]
             while (job := self._daemon.get("/path"))["planning"]:
                 self._looked_s = time.monotonic()

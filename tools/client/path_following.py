@@ -33,7 +33,7 @@ def follow(
 ) -> None:
     """Let the daemon plan the path of a file and follow it to its end; `feed` is at most 1."""
     options.require_use(file)
-    body = {"name": plain_name(file), "text": read_source(file, _MOST_BYTES), **options.request()}
+    body = {**path_source(file), **options.request()}
     with opened as daemon:
         _require_platform(daemon, out)
         require_held(daemon.get("/status"))
@@ -60,6 +60,11 @@ def follow(
             if lasts:
                 out.note(f"{file.name}: continues with line {line}")
                 planned = _planned(daemon, body, number)
+
+
+def path_source(file: Path) -> dict[str, str]:
+    """Return a path file's name and text for the daemon; raises PathError and ProfileError."""
+    return {"name": plain_name(file), "text": read_source(file, _MOST_BYTES)}
 
 
 def plain_name(file: Path) -> str:
