@@ -200,6 +200,28 @@ def _path(daemon: RealDaemon) -> dict[str, Any]:
     return progress
 
 
+def test_a_held_enter_key_presses_a_button_once(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    def moves() -> int:
+        events = daemon.http.get("/events").json()["events"]
+        return sum(one["times"] for one in events if one["text"].startswith("pose by"))
+
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        before = moves()
+        page.get_by_role("button", name="x plus 10 mm").focus()
+        for _ in range(3):
+            page.keyboard.down("Enter")
+        page.keyboard.up("Enter")
+        until(lambda: moves() > before)
+        see(page, "Holding the platform")
+        press(page, "x minus 10 mm")
+        until(lambda: moves() > before + 1)
+        page.wait_for_timeout(300)
+        assert moves() == before + 2
+
+
 def test_a_stopped_move_continues_to_its_target(
     daemon: RealDaemon, browser: playwright_api.Browser
 ) -> None:

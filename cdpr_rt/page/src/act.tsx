@@ -19,6 +19,7 @@ export function StopButton() {
   useEffect(() => {
     const isText = (target: EventTarget | null): boolean => target instanceof HTMLInputElement && target.type === "password";
     const pressed = (event: KeyboardEvent): void => {
+      if (event.key === "Enter" && event.repeat) event.preventDefault(); // a key that is held presses once
       if (event.code !== "Space" || isText(event.target)) return;
       event.preventDefault(); // the bar stops; Enter presses buttons
       if (event.type === "keydown" && !event.repeat) stop();

@@ -95,6 +95,22 @@ export async function request<T>(
   throw new Rejected(why);
 }
 
+/**
+ * Call `look` at once and `pause_ms` after each of its ends; return what ends it.
+ *
+ * Slow answers do not pile up: they would occupy all connections of the browser, and a stop would wait for one.
+ */
+export function repeat(look: () => Promise<unknown>, pause_ms: number): () => void {
+  let on = true;
+  void (async () => {
+    while (on) {
+      await look();
+      await new Promise((resume) => setTimeout(resume, pause_ms));
+    }
+  })();
+  return () => void (on = false);
+}
+
 export async function socketTo(path: string, query: Record<string, string>): Promise<WebSocket> {
   if (key) query["ticket"] = (await request<{ ticket: string }>("POST", "/ticket")).ticket;
   return new WebSocket(`ws://${location.host}${path}?${new URLSearchParams(query)}`);

@@ -1,6 +1,6 @@
 // Drives and bus: states and errors as text, objects, timing, events.
 import { useEffect, useState } from "preact/hooks";
-import { type DriveObject, type Drives as DrivesAnswer, type Status, clientName, request } from "./daemon";
+import { type DriveObject, type Drives as DrivesAnswer, type Status, clientName, repeat, request } from "./daemon";
 import { EventLine } from "./look";
 import { store, useStore } from "./store";
 import "./data.css";
@@ -23,20 +23,15 @@ export function Drives() {
   const [found, setFound] = useState<DrivesAnswer | null>(null);
   const [why, setWhy] = useState("");
   const [axis, setAxis] = useState(0);
-  useEffect(() => {
-    const look = async (): Promise<void> => {
-      if (document.visibilityState !== "visible") return;
-      try {
-        setFound(await request<DrivesAnswer>("GET", "/drives"));
-        setWhy("");
-      } catch (error) {
-        setWhy((error as Error).message);
-      }
-    };
-    void look();
-    const looking = setInterval(() => void look(), LOOK_MS);
-    return () => clearInterval(looking);
-  }, []);
+  useEffect(() => repeat(async () => {
+    if (document.visibilityState !== "visible") return;
+    try {
+      setFound(await request<DrivesAnswer>("GET", "/drives"));
+      setWhy("");
+    } catch (error) {
+      setWhy((error as Error).message);
+    }
+  }, LOOK_MS), []);
   const drive = found?.drives[axis];
   return (
     <div class="columns drives-first">

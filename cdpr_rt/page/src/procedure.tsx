@@ -1,7 +1,7 @@
 // The procedure that the daemon runs for a page: its progress, curves, end and reports.
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
-import { type Curves, type Job, type Wanted, clientName, request } from "./daemon";
+import { type Curves, type Job, type Wanted, clientName, repeat, request } from "./daemon";
 import { store, useStore } from "./store";
 import { axisStyle, curveColour } from "./trend";
 import "./procedure.css";
@@ -22,17 +22,18 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
   useEffect(() => {
     if (!connected) return;
     let shown = true;
-    const look = async (): Promise<void> => {
+    const end = repeat(async () => {
       try {
         const value = await request<Job>("GET", "/procedure");
         if (shown && (JSON.stringify(value) !== JSON.stringify(latest))) show(value);
       } catch {
         // the daemon is away; tried again
       }
-      if (shown) setTimeout(() => void look(), LOOK_MS);
+    }, LOOK_MS);
+    return () => {
+      shown = false;
+      end();
     };
-    void look();
-    return () => void (shown = false);
   }, [connected]);
   return { job, start: (wanted) => store.attempt(async () => show(await store.right.procedure(wanted))) };
 }
@@ -95,10 +96,9 @@ const SHOWN: { key: "error_deg" | "torque_Nm"; title: string }[] = [
 /** The last seconds of the measurement that runs. */
 function LiveCurves() {
   const [found, setFound] = useState<Curves | null>(null);
-  useEffect(() => {
-    const timer = setInterval(() => void request<Curves>("GET", "/procedure/curves").then((value) => value.time_s.length && setFound(value), () => undefined), 2 * LOOK_MS);
-    return () => clearInterval(timer);
-  }, []);
+  useEffect(() => repeat(
+    () => request<Curves>("GET", "/procedure/curves").then((value) => value.time_s.length && setFound(value), () => undefined), 2 * LOOK_MS,
+  ), []);
   if (!found?.time_s.length) return null;
   return (
     <div class="trends">

@@ -1,7 +1,7 @@
 // Recordings: their list, download, and the way to the scope.
 import { useEffect, useState } from "preact/hooks";
 import { linkTo } from "./address";
-import { type RecordingFile, download, request } from "./daemon";
+import { type RecordingFile, download, repeat, request } from "./daemon";
 import { store, useStore } from "./store";
 import "./data.css";
 
@@ -22,18 +22,14 @@ export function Recordings() {
   const { status } = useStore();
   const [files, setFiles] = useState<RecordingFile[] | null>(null);
   const [most, setMost] = useState(SHOWN);
-  useEffect(() => {
-    const look = async (): Promise<void> => {
-      try {
-        setFiles((await request<{ recordings: RecordingFile[] }>("GET", "/recordings")).recordings);
-      } catch {
-        // the list stays; the header shows that the daemon does not answer
-      }
-    };
-    void look();
-    const looking = setInterval(() => document.visibilityState === "visible" && void look(), LOOK_MS);
-    return () => clearInterval(looking);
-  }, []);
+  useEffect(() => repeat(async () => {
+    if (document.visibilityState !== "visible") return;
+    try {
+      setFiles((await request<{ recordings: RecordingFile[] }>("GET", "/recordings")).recordings);
+    } catch {
+      // the list stays; the header shows that the daemon does not answer
+    }
+  }, LOOK_MS), []);
   const part = status?.parts["recording"] as { recording?: boolean; error?: string } | undefined;
   return (
     <section class="card" aria-labelledby="recordings">
