@@ -39,6 +39,10 @@ _FRAME_LETTERS = (b"t", b"T", b"r", b"R")
 _SENT_LETTERS = (b"z", b"Z")
 _FLAGS_EVERY_S = 0.5
 _ENDS = re.compile(rb"([^\r\a]*)([\r\a])")
+_VERSION = rb"V|.*[a-z]"
+"""Beginning of an answer to V. The firmware of CANable adapters answers with a commit and an
+address; the rest of a frame has no lower-case letters.
+"""
 _LONGEST_LINE = 64
 # flags of F (SJA1000), and the Linux error frames that they become
 _RX_FULL, _TX_FULL, _WARNING, _OVERRUN, _PASSIVE, _BUS_ERROR = 0x01, 0x02, 0x04, 0x08, 0x20, 0x80
@@ -80,7 +84,7 @@ class SlcanAdapter:
         self._serial.reset_input_buffer()
         # answers before the version belong to earlier commands
         self._put(b"\rC\r")
-        version = self._command("V", _SYNCHRONISE_S, begins=b"V")
+        version = self._command("V", _SYNCHRONISE_S, _VERSION)
         self._rest = b""
         answers = []
         for command in ([code] if code else []) + ["O"]:
@@ -98,12 +102,10 @@ class SlcanAdapter:
         if (self._command("F") or b"").startswith(b"F"):
             self._query_at_s = time.monotonic() + _FLAGS_EVERY_S
 
-    def _command(
-        self, text: str, timeout_s: float = _ANSWER_S, begins: bytes = b""
-    ) -> bytes | None:
+    def _command(self, text: str, timeout_s: float = _ANSWER_S, like: bytes = b"") -> bytes | None:
         """Return the answer to a command, with its CR or BEL; None if no answer arrived in time.
 
-        Skip frames and answers that do not begin with `begins`.
+        Skip frames and answers that do not begin `like` this.
         """
         self._put(text.encode() + b"\r")
         deadline = time.monotonic() + timeout_s
@@ -112,7 +114,7 @@ class SlcanAdapter:
             while match := _ENDS.match(self._rest):
                 self._rest = self._rest[match.end() :]
                 line = match[1]
-                if line[:1] not in _FRAME_LETTERS + _SENT_LETTERS and line.startswith(begins):
+                if line[:1] not in _FRAME_LETTERS + _SENT_LETTERS and re.match(like, line):
                     return match[0] if line else match[2]
         return None
 

@@ -124,8 +124,11 @@ def test_a_command_rejected_by_the_adapter_is_reported(
     assert str(caught.value).count(adapter.path) == 1
 
 
-def test_an_adapter_that_only_answers_the_version_query_is_accepted(start: Start) -> None:
-    adapter = start({b"V": b"V1013\r"})
+@pytest.mark.parametrize("version", [b"V1013\r", b"b158aa7 git@example.org:fw.git\r"])
+def test_an_adapter_that_only_answers_the_version_query_is_accepted(
+    start: Start, version: bytes
+) -> None:
+    adapter = start({b"V": version})
     port = opened(adapter.url)
     adapter.say(b"t1810\r")
     assert receive(port) == frame(0x181)
@@ -134,7 +137,7 @@ def test_an_adapter_that_only_answers_the_version_query_is_accepted(start: Start
 
 def test_late_answers_to_earlier_commands_are_ignored(start: Start) -> None:
     """A channel that is already closed rejects the close command, maybe late."""
-    adapter = start(GOOD | {b"C": b"", b"V": b"\az\rt1810\r\aV1013\r"})
+    adapter = start(GOOD | {b"C": b"", b"V": b"\az\rt1810\r10AB\r\aV1013\r"})
     open_port(adapter.url).close()
 
 
