@@ -405,7 +405,10 @@ class ModbusLine:
             clock.wait(None, asked_s + taken_s)
         answer = answer_in(data, self._framer, unit)
         if answer is None or answer.function_code & 0x7F != code:
-            raise self._wrong(unit, what, self._missing_answer_reason(data, unit, code))
+            reason = self._missing_answer_reason(data, unit, code)
+            if len(data) > 3 and question.startswith(data[: len(question)]):
+                reason = "the adapter returns what it sends: switch off its echo (local echo)"
+            raise self._wrong(unit, what, reason)
         if isinstance(answer, ExceptionResponse):
             raise self._wrong(unit, what, refusal(answer))
         return answer

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import os
+import pty
 import struct
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +14,7 @@ import numpy as np
 import pytest
 import serial
 
-from cdpr_drivers.modbus.channel import LineError, ModbusError
+from cdpr_drivers.modbus.channel import LineError, ModbusError, ModbusLine
 from cdpr_drivers.modbus.tension import LoadCells, TensionSampler, raw_value
 from cdpr_profiles.tension_sensor import TensionSensors, ValueMap, load_tension_sensors
 from cdpr_rt.core.clock import PacedClock
@@ -265,3 +268,18 @@ def test_a_closed_sampler_leaves_no_file_descriptor_open(rig: LoadCellRig) -> No
             sampler.await_readings(10.0)
             assert np.isfinite(sampler.exchange.feedback.tension_N).all()
     assert len(list(Path("/proc/self/fd").iterdir())) == count
+
+
+def test_an_adapter_that_echoes_is_named() -> None:
+    ours, theirs = pty.openpty()
+    line = ModbusLine(os.ttyname(theirs), 115200, PacedClock(), timeout_s=0.2, retries=0)
+    echo = threading.Thread(target=lambda: os.write(ours, os.read(ours, 64)), daemon=True)
+    echo.start()
+    try:
+        with pytest.raises(ModbusError, match="switch off its echo"):
+            line.registers("input", 1, 0, 2)
+    finally:
+        line.close()
+        echo.join(5.0)
+        os.close(ours)
+        os.close(theirs)
