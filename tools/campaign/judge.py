@@ -85,11 +85,11 @@ class Judge:
 
     @property
     def disturbed_s(self) -> float:
-        """Bus time of the first fault or stall."""
+        """Bus time of the first fault or stall, infinite without one."""
         begun_s = self.played.began_s
         times = [begun_s + fault["at_s"] for fault in self.played.scenario.faults]
         times += [at_s for name, at_s in self.played.done if name in ("stall", "die")]
-        return float(min(times))
+        return min(times, default=math.inf)
 
     def named(self) -> Iterator[tuple[dict[str, Any], float, bool]]:
         """Yield each fault that the robot named: its record, its time, and whether as the cause."""
