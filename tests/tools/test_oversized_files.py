@@ -172,7 +172,7 @@ def many_schemas(path: Path) -> None:
     [
         ("a.eds", compact_arrays, "objects; allowed: up to 20000"),
         ("c.nc", full_circles, "nodes; allowed: 1000000: divide the file"),
-        ("d.nc", empty_lines, "the file has more lines than"),
+        ("d.nc", empty_lines, "the file has more than"),
         ("e.csv", long_cell, "...; allowed: -1e+06 to 1e+06"),
         ("f.png", many_pixels, "too many pixels; allowed: up to 120000000"),
         ("g.png", pipe, "is not a regular file"),

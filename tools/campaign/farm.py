@@ -95,6 +95,8 @@ def _serve() -> None:
             given = [Scenario(**one) for one in json.loads(line)]
             found = run_scenarios(given)
             os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
+    for number in (signal.SIGTERM, signal.SIGINT):  # would interrupt the end of the interpreter
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _end_with(parent: int) -> None:

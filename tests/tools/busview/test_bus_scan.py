@@ -128,7 +128,7 @@ def test_scan_prints_a_table(lab: Lab) -> None:
     assert title == f"{lab.bus}: 1 node"
     assert re.split(r"\s{2,}", row.strip()) == [
         "2",
-        "not told",
+        "unknown",
         "Generic CiA 402 torque servo",
         "generic-cia402",
         "switch on disabled",
