@@ -42,10 +42,7 @@ def test_the_baseline_loop_runs_the_same_axes_and_costs_more(
 
 
 @ALONE
-def test_bench_api_measures_starts_and_controllers_in_lockstep_and_paced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(api, "ROBOT", str(slower_robot(tmp_path, api.ROBOT)))
+def test_bench_api_measures_starts_and_controllers_in_lockstep_and_paced() -> None:
     figures = api.measure(1, 200, 3.0, Output(as_json=True))
     simulated, daemon = (figures.more["starts"][way] for way in (api.SIMULATED, api.DAEMON))
     assert (
