@@ -135,6 +135,7 @@ def daemon(robot: Robot, seconds: float, folder: Path, controller: str | None = 
         "missed": int(rows["missed"][-1] - rows["missed"][0]),
         "stopped": 0,
         "processor_s": processor_s,
+        "off_m": np.linalg.norm(rows["pose"][:, :3] - rows["pose_setpoint"][:, :3], axis=1),
     }
 
 

@@ -55,7 +55,8 @@ def test_bench_api_measures_starts_and_controllers_in_lockstep_and_paced() -> No
     assert set(figures.rows) == {api.BUILT_IN, api.NOTHING, api.POSE}
     assert figures.rows[api.POSE]["CPU p50"] > figures.rows[api.NOTHING]["CPU p50"]
     assert all(row["cycles"] > 0.5 * 3.0 / PERIOD_S for row in figures.more["paced"].values())
-    assert set(figures.targets) == {"start_s", "over_us", "late"}
+    assert set(figures.targets) == {"start_s", "over_us", "late", "off_mm"}
+    assert figures.more["paced"][api.POSE]["off by p50, mm"] < 3.0
 
 
 @ALONE
