@@ -21,8 +21,8 @@ from cdpr_rt.identification.cogging_profile import (
     CoggingProfileError,
     DriveIdentity,
 )
+from cdpr_rt.identification.commissioning_results import Paths
 from cdpr_rt.model.robot_arrays import limits_of
-from cdpr_rt.procedures.commissioning_results import Paths
 
 CoggingProfiles = tuple[CoggingProfile | None, ...]
 """Profile of each axis of a robot; None if its motor has not been commissioned."""

@@ -23,12 +23,11 @@ from cdpr_drivers.cia402 import POWER_OFF, Mode, State, state_of, supported_mode
 from cdpr_drivers.errors import DriveFaultError, ModeRefusedError, SdoError
 from cdpr_profiles import DriveProfile, load_winch
 from cdpr_rt.control.tuning import design_pid
+from cdpr_rt.identification.commissioning_results import Paths, recording
 from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.loop.engine import RefusedError
-from cdpr_rt.procedures.commissioning_results import Paths
-from cdpr_rt.procedures.measurement import both_ways, recording
 from cdpr_tools.commands.drive import info
-from cdpr_tools.commission.commissioning import Commissioning, Measurement
+from cdpr_tools.commission.commissioning import Commissioning, Measurement, both_ways
 from cdpr_tools.composition.session import Session, open_bus, open_winch
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.output import Output

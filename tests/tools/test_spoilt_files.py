@@ -33,11 +33,10 @@ from cdpr_profiles.tension_sensor import load_tension_sensors
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.control.tuning import design_pid
 from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.identification.commissioning_results import Paths, read_run, recording
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.model.last_lengths import LastLengths
 from cdpr_rt.model.robot_arrays import described, limits_of, winches_of
-from cdpr_rt.procedures.commissioning_results import Paths, read_run
-from cdpr_rt.procedures.measurement import recording
 from cdpr_sim_bus.canopen.od import ObjectDictionary
 from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant

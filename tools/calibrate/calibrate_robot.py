@@ -19,8 +19,8 @@ from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
 from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.finish import concluded, stop_criterion
+from cdpr_tools.calibrate.measure_poses import PoseOperator
 from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted
-from cdpr_tools.calibrate.pose_operator import PoseOperator
 from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.output import Output

@@ -27,8 +27,8 @@ from cdpr_tools.calibrate.daemon_run import (
     robot_of,
 )
 from cdpr_tools.calibrate.finish import identified, with_hand_eye
+from cdpr_tools.calibrate.measure_poses import PoseOperator, StoppedError
 from cdpr_tools.calibrate.places import chosen_places
-from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError
 from cdpr_tools.calibrate.rig import simulated_rig
 from cdpr_tools.calibrate.run import DATA, no_poses
 from cdpr_tools.client.client import Daemon

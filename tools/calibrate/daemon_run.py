@@ -25,10 +25,15 @@ from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, PoseReading, load_points
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.procedures.measure_poses import Measured, PoseRefusedError, read_pose
 from cdpr_tools.calibrate import run
+from cdpr_tools.calibrate.measure_poses import (
+    Measured,
+    PoseOperator,
+    PoseRefusedError,
+    TakeImage,
+    read_pose,
+)
 from cdpr_tools.calibrate.places import Places
-from cdpr_tools.calibrate.pose_operator import PoseOperator, TakeImage
 from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError

@@ -18,10 +18,10 @@ from cdpr_rt.calibration.marker_detection import Board, MarkerDetector, fit_intr
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CameraSetup
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.procedures.measure_poses import NotThePoseError
 from cdpr_sim_bus.camera.sim_camera import Box, SimCamera, random_poses
 from cdpr_sim_bus.robot.camera_plant import DEFAULT_SCENE, BoardPlant, CameraPlant, MountPlant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from cdpr_tools.calibrate.measure_poses import NotThePoseError
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 

@@ -20,12 +20,12 @@ from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.procedures.measure_poses import (
+from cdpr_rt.robot import Error, Robot
+from cdpr_tools.calibrate.measure_poses import (
+    PoseOperator,
     Readings,
     TargetNotReached,
 )
-from cdpr_rt.robot import Error, Robot
-from cdpr_tools.calibrate.pose_operator import PoseOperator
 from cdpr_tools.client.daemon_robot import robot_errors
 from cdpr_tools.lockstep_robot import LockstepRobot
 

@@ -30,9 +30,11 @@ from cdpr_rt.calibration.readings import (
 from cdpr_rt.calibration.verification import every_fifth
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.errors import ControlError
-from cdpr_rt.procedures.measure_poses import (
+from cdpr_tools.calibrate.measure_poses import (
     Measured,
+    PoseOperator,
     PoseRefusedError,
+    StoppedError,
     measure_poses,
     read_pose,
 )
@@ -43,7 +45,6 @@ from cdpr_tools.calibrate.places import (
     listed_places,
     places_of,
 )
-from cdpr_tools.calibrate.pose_operator import PoseOperator, StoppedError
 from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator, simulated_rig
 from cdpr_tools.calibrate.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError

@@ -181,8 +181,8 @@ def measure(
         from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
         from cdpr_tools.calibrate.daemon_run import AskedPoints, require_points_of  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import concluded, finish, stop_criterion, with_hand_eye  # noqa: PLC0415
+        from cdpr_tools.calibrate.measure_poses import PoseOperator  # noqa: PLC0415
         from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
-        from cdpr_tools.calibrate.pose_operator import PoseOperator  # noqa: PLC0415
         from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only  # noqa: PLC0415  # slow to load
         from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
@@ -246,7 +246,7 @@ def read(
     fifteen poses are needed. `cdpr calibrate measure` moves to poses automatically.
     """
     from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
-    from cdpr_tools.calibrate.pose_operator import PoseOperator  # noqa: PLC0415
+    from cdpr_tools.calibrate.measure_poses import PoseOperator  # noqa: PLC0415
     from cdpr_tools.calibrate.run import DATA, POINTS  # noqa: PLC0415  # slow to load
     from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
 

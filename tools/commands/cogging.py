@@ -17,8 +17,7 @@ from cdpr_rt.identification.cogging_profile import (
     CoggingProfileError,
     DriveIdentity,
 )
-from cdpr_rt.identification.rawlog import read_raw_log
-from cdpr_rt.procedures.commissioning_results import (
+from cdpr_rt.identification.commissioning_results import (
     METHODS,
     Paths,
     assemble,
@@ -29,6 +28,7 @@ from cdpr_rt.procedures.commissioning_results import (
     store_profile,
     validation_name,
 )
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.robot import Robot
 from cdpr_tools.commands import options
 from cdpr_tools.commands.commission import IndexOption

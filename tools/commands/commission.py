@@ -15,12 +15,11 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.robot.commissioned import folder_of
 from cdpr_drivers.robot.robot_buses import require_fit, robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
+from cdpr_rt.identification.commissioning_results import Paths
 from cdpr_rt.loop.realtime import one_core
-from cdpr_rt.procedures.commissioning_results import Paths
-from cdpr_rt.procedures.measurement import Index
 from cdpr_tools.commands import options
 from cdpr_tools.commands.options import option
-from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH
+from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Index
 from cdpr_tools.commission.run import Request, commission_winch, prepare
 from cdpr_tools.composition.session import confirm_motion, open_bus
 from cdpr_tools.composition.simulator import OwnSimulator

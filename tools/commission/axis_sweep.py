@@ -16,10 +16,10 @@ from cdpr_profiles import Robot as Profile
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.identification.cogging_profile import DriveIdentity
+from cdpr_rt.identification.commissioning_results import Paths
 from cdpr_rt.identification.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
-from cdpr_rt.procedures.commissioning_results import Paths
-from cdpr_rt.procedures.measurement import SWEEP_LEAD_IN_RAD
 from cdpr_rt.robot import Error, Robot
+from cdpr_tools.commission.commissioning import SWEEP_LEAD_IN_RAD
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 

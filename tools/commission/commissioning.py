@@ -9,20 +9,19 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cdpr_profiles.motor_bounds import MotorBounds
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.control.compensation import AxisCompensation, Compensation
 from cdpr_rt.control.pid import Pid, Proportional
 from cdpr_rt.control.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from cdpr_rt.errors import TripError
 from cdpr_rt.identification.cogging_profile import CoggingProfile, stored_harmonic_model
-from cdpr_rt.identification.harmonic_model import MOST_ROUNDS, SecondPass
-from cdpr_rt.loop.operating import Notifier
-from cdpr_rt.procedures.commissioning_results import (
+from cdpr_rt.identification.commissioning_results import (
     METHODS,
     Identified,
     Paths,
@@ -32,8 +31,89 @@ from cdpr_rt.procedures.commissioning_results import (
     store_profile,
     validation_name,
 )
-from cdpr_rt.procedures.measurement import SWEEP_LEAD_IN_RAD, Index, Pass, both_ways, run_pass
+from cdpr_rt.identification.harmonic_model import MOST_ROUNDS, SecondPass
+from cdpr_rt.identification.rawlog import RawLogWriter, column_names
+from cdpr_rt.loop.operating import Notifier, Operator
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_tools.composition.session import Session
+
+Index = Literal["homing", "probe"]
+"""How to find the encoder index: by homing, or by the touch probe during a normal motion."""
+
+# the rotor lags the set-point by friction over gain; the lag in both directions fits in here
+SWEEP_LEAD_IN_RAD = math.radians(30.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pass:
+    """One pass at constant speed: motor angle to cover after a lead-in, in one direction."""
+
+    speed_rad_s: float
+    """Speed of the pass, signed."""
+    lead_in_rad: float
+    """Angle that is covered first and not evaluated, so that friction and controller have
+    settled."""
+    distance_rad: float
+    ramp_s: float = 0.5
+    """Time to reach the speed, and to stop."""
+    with_ramps: bool = False
+    """Whether to evaluate the ramps too, which is required for the inertia."""
+
+    def move(self, start_rad: FloatArray) -> TrapezoidalMove:
+        """Return the set-point of n axes that start at `start_rad` (n,)."""
+        cruise = (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s)
+        speed = np.full(np.shape(start_rad), self.speed_rad_s)
+        return TrapezoidalMove(start_rad, speed, cruise, self.ramp_s)
+
+    def duration_s(self) -> float:
+        """Return the duration of the pass."""
+        return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * self.ramp_s
+
+    def measured(self) -> tuple[float, float]:
+        """Return the times, in s from the start, between which the pass is evaluated."""
+        if self.with_ramps:
+            return 0.0, self.duration_s()
+        begin = self.ramp_s + self.lead_in_rad / abs(self.speed_rad_s)
+        return begin, begin + self.distance_rad / abs(self.speed_rad_s)
+
+
+def both_ways(speed_rad_s: float, lead_in_rad: float, turns: float) -> tuple[Pass, Pass]:
+    """Return a pass forward and one backward over whole turns."""
+    there = Pass(speed_rad_s, lead_in_rad, turns * math.tau)
+    return there, dataclasses.replace(there, speed_rad_s=-speed_rad_s)
+
+
+def run_pass(
+    operator: Operator,
+    controller: Controller,
+    what: Pass,
+    path: Path,
+    meta: dict[str, Any],
+    on_progress: Callable[[float], None] | None = None,
+) -> Path:
+    """Run `controller` along one pass from the present position, recording into `path`.
+
+    Raises the errors of `Operator.follow`; the file is always closed and kept.
+    """
+    device = operator.device
+    begin, end = what.measured()
+    meta = {
+        **meta,
+        "axes": device.n,
+        "period_s": device.period_s,
+        "speed_rad_s": what.speed_rad_s,
+        "measured_from_s": begin,
+        "measured_until_s": end,
+        "first_cycle": device.feedback.cycle + 1,
+    }
+    log = RawLogWriter(path, column_names(device.n), meta)
+    try:
+        move = what.move(device.feedback.position_rad)
+        operator.follow(controller, move, log, on_progress)
+    finally:
+        log.close()
+    return path
+
 
 # Passes of one winch's motor: slow sweeps, fast turns, ramps with or without compensation.
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging_profile import CoggingProfile
+from cdpr_rt.identification.commissioning_results import Paths, recording
 from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.identification.torque_lag import with_lag
 from cdpr_rt.identification.windows import SweepData
-from cdpr_rt.procedures.commissioning_results import Paths
-from cdpr_rt.procedures.measurement import recording
 
 LEAST_SQUARES_ORDERS: Final = 40
 CURVES: Final = ("harmonic", "thesis", "least squares")

@@ -12,10 +12,10 @@ import scipy
 
 from cdpr_rt.arrays import BoolArray, FloatArray, rms
 from cdpr_rt.control.validation import low_pass_velocity
+from cdpr_rt.identification.commissioning_results import Recording, recording
 from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.identification.result import HarmonicResult
 from cdpr_rt.identification.thesis import DEGREE, GRID, ThesisResult, WINDOW_deg
-from cdpr_rt.procedures.measurement import Recording, recording
 from cdpr_tools.recordings.truth import Truth
 
 _BINS = 720

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cdpr_profiles import Winch
+from cdpr_rt.identification.commissioning_results import METHODS, Identified, Paths, validation_name
 from cdpr_rt.identification.rawlog import read_raw_log
-from cdpr_rt.procedures.commissioning_results import METHODS, Identified, Paths, validation_name
 from cdpr_tools.commission import curves, figures
 from cdpr_tools.commission.curves import Ramp, ResidualEffort
 from cdpr_tools.errors import BadInputError

@@ -15,8 +15,7 @@ from cdpr_drivers.errors import ConfigurationError, DriveFaultError, DriverError
 from cdpr_profiles import Winch, load_winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.errors import ControlError, InterruptedMotionError, InvalidRequestError, TripError
-from cdpr_rt.procedures.commissioning_results import Paths, assemble, identify
-from cdpr_rt.procedures.measurement import Index
+from cdpr_rt.identification.commissioning_results import Paths, assemble, identify
 from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot
 from cdpr_tools.commission import summary
 from cdpr_tools.commission.commissioning import (
@@ -24,6 +23,7 @@ from cdpr_tools.commission.commissioning import (
     QUICK,
     THOROUGH,
     Commissioning,
+    Index,
     Plan,
 )
 from cdpr_tools.composition.session import open_bus, open_winch

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cdpr_rt.procedures.commissioning_results import METHODS
+from cdpr_rt.identification.commissioning_results import METHODS
 from cdpr_tools.output import Output, TableText
 
 _NAMES = {"none": "no compensation", "thesis": "thesis' method", "harmonic": "harmonic model"}

@@ -28,7 +28,7 @@ from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.model.statics import statics_of
 from cdpr_rt.motion.path_description import Move, PathDescription
 from cdpr_rt.motion.pose_stream import PoseStream
-from cdpr_rt.procedures.path_planning import PathPlanner
+from cdpr_rt.programs.path_planning import PathPlanner
 from cdpr_rt.programs.path_store import first_fault
 from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.loop_parts import loop_parts

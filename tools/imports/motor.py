@@ -15,6 +15,7 @@ from cdpr_profiles import Winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging_profile import IMPORTED_SERIAL
+from cdpr_rt.identification.commissioning_results import Paths
 from cdpr_rt.identification.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
 from cdpr_rt.identification.torque_lag import (
     MOST_RESIDUAL,
@@ -23,7 +24,6 @@ from cdpr_rt.identification.torque_lag import (
     resampled,
 )
 from cdpr_rt.identification.windows import SweepData
-from cdpr_rt.procedures.commissioning_results import Paths
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.imports.logs import read_any
 from cdpr_tools.imports.mapping import (

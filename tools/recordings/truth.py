@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from cdpr_profiles.bounded_input import open_regular, parse_json
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.identification.commissioning_results import AngleOf, Recording
 from cdpr_rt.identification.rawlog import RawLog
-from cdpr_rt.procedures.commissioning_results import AngleOf
-from cdpr_rt.procedures.measurement import Recording
 from cdpr_tools.errors import BadInputError
 
 _HEADER_BYTES = 1024

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.way_points import read_path, read_source
-from cdpr_rt.procedures import path_planning
+from cdpr_rt.programs import path_planning
 from cdpr_rt.programs.path_store import paths_folder, write_plan
 from cdpr_tools import style
 from cdpr_tools.output import TableText, time_text

@@ -13,7 +13,7 @@ from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.motion.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path_nodes import pieces_of
-from cdpr_rt.procedures.path_planning import PathPlan, PathPlanner
+from cdpr_rt.programs.path_planning import PathPlan, PathPlanner
 from cdpr_rt.programs.path_store import write_plan
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.directions import Directions

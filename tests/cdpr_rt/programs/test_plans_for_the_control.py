@@ -13,9 +13,9 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.model.robot_arrays import limits_of, winches_of
 from cdpr_rt.motion.path_description import Move, PathDescription
-from cdpr_rt.procedures.path_planning import PathPlanner
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.path_planning import PathPlanner
 from cdpr_rt.programs.path_store import PathStore, write_plan
 from cdpr_rt.programs.registry import platform_parts
 

@@ -13,7 +13,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.readings import load_points
 from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.daemon_run import AskedPoints, require_points_of
-from cdpr_tools.calibrate.pose_operator import StoppedError
+from cdpr_tools.calibrate.measure_poses import StoppedError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 

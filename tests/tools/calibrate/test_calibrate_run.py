@@ -20,16 +20,16 @@ from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, load_data
 from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import TripError
-from cdpr_rt.procedures.measure_poses import (
+from cdpr_tools.calibrate import run
+from cdpr_tools.calibrate.measure_poses import (
     SETTLE_S,
     NotThePoseError,
     PoseRefusedError,
     Readings,
+    StoppedError,
     TargetNotReached,
 )
-from cdpr_tools.calibrate import run
 from cdpr_tools.calibrate.places import chosen_places
-from cdpr_tools.calibrate.pose_operator import StoppedError
 from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output

@@ -16,7 +16,7 @@ from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CalibrationData, load_data
 from cdpr_tools.calibrate import daemon_run, pose_camera, run
-from cdpr_tools.calibrate.pose_operator import PoseOperator, TakeImage
+from cdpr_tools.calibrate.measure_poses import PoseOperator, TakeImage
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from cdpr_drivers.camera.camera import Camera, CameraError, Image
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_rt.procedures.measure_poses import NotThePoseError
 from cdpr_tools.calibrate import pose_camera
+from cdpr_tools.calibrate.measure_poses import NotThePoseError
 from cdpr_tools.calibrate.pose_camera import PoseCamera
 from cdpr_tools.errors import BadInputError
 

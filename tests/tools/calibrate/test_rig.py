@@ -10,15 +10,15 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.errors import TripError
-from cdpr_rt.procedures.measure_poses import (
+from cdpr_tools.calibrate import measure_poses as measuring
+from cdpr_tools.calibrate.measure_poses import (
     Measured,
     NotThePoseError,
+    StoppedError,
     measure_poses,
     read_pose,
 )
-from cdpr_tools.calibrate import pose_operator
 from cdpr_tools.calibrate.places import chosen_places
-from cdpr_tools.calibrate.pose_operator import StoppedError
 from cdpr_tools.calibrate.rig import OutsidePose, simulated_rig
 
 pytestmark = pytest.mark.long
@@ -81,8 +81,8 @@ def test_a_pose_not_reached_in_time_is_read_where_the_platform_is_held(
 
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
-        monkeypatch.setattr(pose_operator, "_SLOWED", 0.3)
-        monkeypatch.setattr(pose_operator, "_LATE_S", 0.0)
+        monkeypatch.setattr(measuring, "_SLOWED", 0.3)
+        monkeypatch.setattr(measuring, "_LATE_S", 0.0)
         measured = Measured(lambda: None)
         measure_poses(operator, [first], places.middle, measured, Noted())
         true = operator.rig.truth()["position_m"][:2].copy()

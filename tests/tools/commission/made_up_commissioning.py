@@ -13,12 +13,12 @@ import numpy as np
 
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.control.tuning import design_pid
+from cdpr_rt.identification.commissioning_results import Identified, Paths, legs, validation_name
 from cdpr_rt.identification.rawlog import RawLogWriter, column_names
 from cdpr_rt.identification.result import ConfidenceInterval, Harmonic, HarmonicResult
 from cdpr_rt.identification.thesis import identify_thesis
 from cdpr_rt.identification.windows import FrictionShape
-from cdpr_rt.procedures.commissioning_results import Identified, Paths, legs, validation_name
-from cdpr_rt.procedures.measurement import Pass
+from cdpr_tools.commission.commissioning import Pass
 
 PERIOD_s = 2e-3
 COUNTS = 8192

@@ -10,7 +10,7 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.cycle_row import cycle_dtype
-from cdpr_rt.procedures.commissioning_results import Paths
+from cdpr_rt.identification.commissioning_results import Paths
 from cdpr_tools.commission.axis_sweep import SweptAxis, write_passes
 from cdpr_tools.errors import BadInputError, WorkFailedError
 

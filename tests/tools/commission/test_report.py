@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from cdpr_profiles import Winch, load_winch
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.procedures.commissioning_results import Paths, assemble
+from cdpr_rt.identification.commissioning_results import Paths, assemble
 from cdpr_tools.commission.page import build
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.recordings.truth import true_angle

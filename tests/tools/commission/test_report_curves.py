@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from scipy.signal import savgol_filter
 
 from cdpr_rt.identification.thesis import ThesisResult
-from cdpr_rt.procedures.measurement import Pass
 from cdpr_tools.commission import curves
+from cdpr_tools.commission.commissioning import Pass
 from cdpr_tools.recordings.truth import Truth
 from cdpr_tools.style import decimated
 from tests.tools.commission.made_up_commissioning import ERROR_ORDER, MadeUp, harmonic_result

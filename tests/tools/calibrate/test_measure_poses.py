@@ -8,7 +8,7 @@ import pytest
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.errors import TripError
-from cdpr_rt.procedures.measure_poses import (
+from cdpr_tools.calibrate.measure_poses import (
     Measured,
     NotThePoseError,
     PoseRefusedError,

@@ -5,21 +5,22 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cdpr_profiles import Winch
 from cdpr_profiles.bounded_input import read_json
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reader import read_json_model
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.tuning import PidDesign, design_pid
 from cdpr_rt.control.validation import ValidationMetrics, evaluate, floor, ratios, worst
-from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.errors import InvalidRequestError, RawLogError
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     DriveIdentity,
@@ -32,7 +33,65 @@ from cdpr_rt.identification.rawlog import RawLog, read_raw_log
 from cdpr_rt.identification.result import HarmonicResult
 from cdpr_rt.identification.thesis import ThesisResult, identify_thesis
 from cdpr_rt.identification.windows import SweepData
-from cdpr_rt.procedures.measurement import Recording, recording
+
+# The recordings of passes.
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recorded pass of one axis, angles from the index; arrays are (samples,)."""
+
+    sweep: SweepData
+    effort_Nm: FloatArray
+    cycle: FloatArray
+    judged: BoolArray
+    """Samples to evaluate: at full speed after the lead-in."""
+    period_s: float
+    complete: bool
+    """Whether the pass is complete; False if the recording ends before the pass."""
+
+
+def recording(log: RawLog) -> Recording:
+    """Return the recording of a pass from a raw log, with angles from the encoder index.
+
+    Raises RawLogError if the log is of another kind, ends before the part to evaluate, or does not
+    contain the index.
+    """
+    try:
+        period = float(log.header["period_s"])
+        begin, end = float(log.header["measured_from_s"]), float(log.header["measured_until_s"])
+        first_cycle = int(log.header["first_cycle"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RawLogError(f"{log.path}: not the recording of a pass ({error})") from error
+    answered = log.column("valid") != 0.0
+    since_start = (log.column("cycle") - first_cycle) * period
+    judged = ((since_start >= begin) & (since_start < end))[answered]
+    if not judged.any():
+        raise RawLogError(
+            f"{log.path}: ends after {since_start[-1]:.1f} s; the part to be measured begins at "
+            f"{begin:.1f} s"
+        )
+    if not log.column("index_known")[answered].all():
+        raise RawLogError(f"{log.path}: the encoder index is not known in this recording")
+    index = log.column("index_rad")[answered]
+    sweep = SweepData(
+        time_s=log.column("time_s")[answered],
+        angle_rad=log.column("position_rad")[answered] - index,
+        torque_Nm=log.column("torque_sent_Nm")[answered],
+        setpoint_rad=log.column("setpoint_rad")[answered] - index,
+        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s")[answered],
+    )
+    if not all(np.isfinite(getattr(sweep, field.name)).all() for field in fields(sweep)):
+        raise RawLogError(f"{log.path}: contains numbers that are not finite")
+    return Recording(
+        sweep=sweep,
+        effort_Nm=log.column("effort_Nm")[answered],
+        cycle=log.column("cycle")[answered],
+        judged=judged,
+        period_s=period,
+        complete=bool(since_start[-1] >= end - 2 * period),
+    )
+
 
 # Evaluation of recorded validation runs, by the encoder or by a more accurate angle.
 

@@ -12,7 +12,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.model.path_wrenches import InertialWrenches, available_wrenches
 from cdpr_rt.motion.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path_description import Move, PathDescription, PathError
-from cdpr_rt.procedures.path_planning import LONGEST_s, PathPlanner, path_tensions
+from cdpr_rt.programs.path_planning import LONGEST_s, PathPlanner, path_tensions
 
 
 @pytest.fixture(scope="module")
