@@ -29,12 +29,10 @@ platform."""
 PUSH_SHARE = 2.0
 """Push that turns a winch outwards against friction, as a multiple of its largest usual
 friction."""
-_USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.25, 6.0, 0.01, 5
-"""Share of that push which turns most winches, and factor on the integral rate beyond it. Time for
+_USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.3, 6.0, 0.01, 5
+"""Share of a push that turns most winches, and factor on the integral rate beyond it. Time for
 which a winch that does not turn is pushed fully, plus cycles until its encoder could show a motion.
 A rotor whose encoder has failed accelerates unseen, so they are short."""
-GIVEN_UP_m = -np.inf
-"""Length still to be paid out by a winch that was pushed fully without turning."""
 
 
 @jit
@@ -48,6 +46,7 @@ def control_speed(
     gain: FloatArray,
     left: FloatArray,
     unseen: FloatArray,
+    stuck: BoolArray,
     push: FloatArray,
     position: FloatArray,
     last: FloatArray,
@@ -70,24 +69,25 @@ def control_speed(
         jumped[i] = fast
         out = cable[i] * speed[i]
         rate = integral_rate
-        if left[i] == GIVEN_UP_m:
-            tension[i] = torque[i] = integral[i] = 0.0
-            continue
         if left[i] > 0.0:
             left[i] -= period * out
-            stands = out < 0.5 * paying_out[i]
-            unseen[i] = unseen[i] + period if stands and tension[i] <= -push[i] < 0.0 else 0.0
-            if unseen[i] > _UNSEEN_S + _UNSEEN_CYCLES * period:
-                left[i] = GIVEN_UP_m
         if left[i] > 0.0:
             least = -push[i]
             if cable[i] * integral[i] > 0.0:  # it turns against its friction alone
                 rate = FIXED_END_1_s
-                if stands and tension[i] < -_USUAL_SHARE * push[i]:
-                    rate *= _HURRY
         else:
             # a loose cable must not be wound up ever faster
             least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
+        if least < 0.0 and out < 0.5 * paying_out[i]:
+            unseen[i] = unseen[i] + period if tension[i] <= least else 0.0
+            stuck[i] |= unseen[i] > _UNSEEN_S + _UNSEEN_CYCLES * period
+            if tension[i] < _USUAL_SHARE * least:
+                rate *= _HURRY
+        else:
+            unseen[i] = 0.0
+        if stuck[i]:
+            tension[i] = torque[i] = integral[i] = left[i] = 0.0
+            continue
         error = paying_out[i] / cable[i] - speed[i]
         integral[i] += gain[i] * rate * period * error
         demand = gain[i] * error + integral[i]
@@ -102,8 +102,8 @@ class WinchSpeedLoop:
     A slack cable is reeled in at the commanded speed, a tight one pulled with `high_N`; a loaded
     cable is paid out at the commanded speed, held with at most `high_N`. While `left_m` of a cable
     is above 0, its motor also pays out without a load, against friction of up to `push_N`. A winch
-    that is pushed so hard and does not turn gets no torque from then on: its encoder may have
-    failed, and its motor would run away.
+    that is pushed outwards as hard as it may be and does not turn is `stuck`. It gets no torque
+    from then on: its encoder may have failed, and its motor would run away.
     Anti-windup by back-calculation.
     """
 
@@ -135,6 +135,8 @@ class WinchSpeedLoop:
         """Commanded tension of the last cycle; negative if the motor pushes outwards."""
         self.speed_rad_s = np.zeros(n)
         """Filtered motor speed."""
+        self.stuck = np.zeros(n, np.bool_)
+        """Whether each winch was pushed outwards fully and has not turned."""
         self._unseen_s = np.zeros(n)
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
@@ -143,7 +145,7 @@ class WinchSpeedLoop:
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
         self._last[:], self._jumped[:] = feedback.position_rad, False
-        self._unseen_s[:] = 0.0
+        self._unseen_s[:], self.stuck[:] = 0.0, False
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
 
@@ -157,7 +159,7 @@ class WinchSpeedLoop:
     ) -> Callable[[float, float], None]:
         return bound(
             control_speed, self._period_s, self._weight, self.low_N, self.high_N,
-            self.paying_out_m_s, self._cable, self._gain, self.left_m, self._unseen_s, self.push_N,
-            feedback.position_rad, self._last, self._jumped, self.speed_rad_s, self._integral,
-            self.tension_N, torque_Nm, then=(0.0, 0.0),
+            self.paying_out_m_s, self._cable, self._gain, self.left_m, self._unseen_s, self.stuck,
+            self.push_N, feedback.position_rad, self._last, self._jumped, self.speed_rad_s,
+            self._integral, self.tension_N, torque_Nm, then=(0.0, 0.0),
         )  # fmt: skip

@@ -33,25 +33,21 @@ _RAISED_1_s = 2.0
 sticks."""
 _LEFT_m, _LEAVE_S = 0.005, 0.5
 """Slack that a cable keeps until all cables have been tight, and the longest time to pay it out."""
-_HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 6.0, 0.01, 5
-"""Factor on the speed of paying out a cable whose winch does not turn with its usual friction. Time
-for which such a winch is pushed with the full bound, plus cycles until its encoder could show a
-motion. A rotor whose encoder has failed accelerates unseen, so they are short."""
 
-LOOSENED, NEXT, REELED_IN, PAID_OUT, WAITING, CLOSING, TIGHT, STUCK = range(8)
+LOOSENED, NEXT, REELED_IN, PAID_OUT, WAITING, CLOSING, TIGHT = range(7)
 """Phases of a cable: paid out a little at first; held until its turn; reeled in alone; paid out
 again after it was tight; held with this slack until the others are ready; reeled in with all
-others; tight. The phases follow in this order unless a cable begins again. If one cable is closing
-or tight, all cables are. The winch of a stuck cable was pushed outwards and has not turned."""
+others; tight. The phases follow in this order unless a cable begins again. If one cable is in one
+of the last two phases, all cables are."""
 (
     FROM_rad, MEAN_m_s, MAY_N, TURNED_N, FREE_N, TIGHT_N, SLACK_m, CYCLES, FIRST_rad, FIRST_N,
-    UNSEEN, STATE,
-) = range(12)  # fmt: skip
+    STATE,
+) = range(11)  # fmt: skip
 """State of a cable: angle at which reeling in or paying out begins; mean speed inwards; tension
 with which it may be reeled in; largest tension that has turned its winch, including the cable's
 weight, and the largest while it was certainly slack; tension when tight, else 0; distance by which
 it was reeled in until it was tight; cycles of paying out; angle at which it was first tight alone,
-nan before that, and its tension there; cycles of pushing with the full bound without turning."""
+nan before that, and its tension there."""
 
 
 class Winches(NamedTuple):
@@ -84,7 +80,7 @@ def enter(first: int, phase: IntArray, state: FloatArray, position: FloatArray) 
         phase[i] = first
         # a cable that only begins to turn, or still has its previous tension, is not tight
         state[i, FROM_rad], state[i, MEAN_m_s] = position[i], TAKE_UP_m_s
-        state[i, TIGHT_N] = state[i, CYCLES] = state[i, UNSEEN] = 0.0
+        state[i, TIGHT_N] = state[i, CYCLES] = 0.0
 
 
 @jit
@@ -147,8 +143,11 @@ def _next_phase(
     """Return the next phase of cable i; `state` (STATE,) is the state of that cable."""
     reeled_m = (state[FROM_rad] - position) * w.cable_m[i]
     if phase in (LOOSENED, PAID_OUT):
-        return _paying_out(w, i, phase, state, reeled_m)
-    if phase in (NEXT, WAITING, STUCK):
+        state[CYCLES] += 1.0
+        if reeled_m >= -_LEFT_m and state[CYCLES] * w.period_s <= _LEAVE_S:
+            return phase
+        return NEXT if phase == LOOSENED else WAITING
+    if phase in (NEXT, WAITING):
         return phase
     # unless the 5 mm paid out were reeled in again, a slack cable was stuck
     returned = reeled_m >= (0.5 if phase == CLOSING else -0.5) * _LEFT_m
@@ -158,26 +157,13 @@ def _next_phase(
     tight = _seems_tight(w, i, state, most, returned)  # also learns the winch's friction
     if not tight or phase == TIGHT:
         return phase
-    state[FROM_rad], state[CYCLES], state[UNSEEN] = position, 0.0, 0.0
+    state[FROM_rad], state[CYCLES] = position, 0.0
     if phase == REELED_IN:
         if math.isnan(state[FIRST_rad]):
             state[FIRST_rad], state[FIRST_N] = position, w.tension_N[i]
         return PAID_OUT
     state[TIGHT_N], state[SLACK_m] = w.tension_N[i], reeled_m
     return TIGHT
-
-
-@jit
-def _paying_out(w: Winches, i: int, phase: int, state: FloatArray, reeled_m: float) -> int:
-    """Return the next phase of cable i, which is being paid out; see `_next_phase`."""
-    state[CYCLES] += 1.0
-    pushed = w.tension_N[i] <= -PULLED * w.enough_N[i] and not _pays_out(w, i)
-    state[UNSEEN] = state[UNSEEN] + 1.0 if pushed else 0.0
-    if state[UNSEEN] > _UNSEEN_S / w.period_s + _UNSEEN_CYCLES:
-        return STUCK
-    if reeled_m >= -_LEFT_m and state[CYCLES] * w.period_s <= _LEAVE_S:
-        return phase
-    return NEXT if phase == LOOSENED else WAITING
 
 
 @jit
@@ -203,12 +189,6 @@ def _turns(w: Winches, i: int) -> bool:
 
 
 @jit
-def _pays_out(w: Winches, i: int) -> bool:
-    """Return whether winch i pays out at half of the take-up speed or more."""
-    return bool(w.cable_m[i] * w.speed_rad_s[i] > 0.5 * TAKE_UP_m_s)
-
-
-@jit
 def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> None:
     """Set bounds and speed of winch i; by default it reels in."""
     if phase == TIGHT:
@@ -220,12 +200,8 @@ def _drive(w: Winches, i: int, phase: int, state: FloatArray, most: float) -> No
             state[MAY_N] = min(raised, most)
         # a sagging cable would run out if it were held with less than its weight
         w.high_N[i] = max(state[MAY_N], _HELD * min(w.hangs_N[i], most))
-    elif phase == STUCK:
-        w.low_N[i], w.high_N[i], w.paying_out_m_s[i] = 0.0, w.hangs_N[i], 0.0
     elif phase in (LOOSENED, PAID_OUT):
-        usual_N = _USUAL_SHARE / _ENOUGH * w.enough_N[i]
-        hurry = _HURRY if w.tension_N[i] < -usual_N and not _pays_out(w, i) else 1.0
-        w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], hurry * TAKE_UP_m_s
+        w.low_N[i], w.paying_out_m_s[i] = -w.enough_N[i], TAKE_UP_m_s
         if phase == PAID_OUT:
             # two tight cables may move the platform; a heavy cable would run out
             w.high_N[i] = w.hangs_N[i]
@@ -329,17 +305,6 @@ class SlackTakeUp:
             f"{self._names[i]} pulls with {pull_N[i]:.1f} N, but only up to {may_N[i]:.1f} "
             "N were commanded"
             for i in np.flatnonzero(which & (self._phase != NEXT))
-        )
-
-    def stuck(self) -> str:
-        """Return the cable whose winch was pushed outwards and has not turned, as text, or ""."""
-        if not (self._phase == STUCK).any():
-            return ""
-        i = int((self._phase == STUCK).argmax())
-        return (
-            f"{self._names[i]}: its motor pushed with {self._enough_N[i]:.0f} N to pay out cable, "
-            "and its encoder shows no motion: the encoder or the winch is stuck; check both before "
-            "you tighten again"
         )
 
     def dragged(self, position_rad: FloatArray) -> str:

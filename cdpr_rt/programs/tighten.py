@@ -652,8 +652,12 @@ class TightenProgram(PlatformProgram):
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
-        if stuck := self._slack.stuck():
-            return stuck
+        if self._winches.stuck.any():
+            return (
+                f"{self._parts.names[int(self._winches.stuck.argmax())]}: its motor was pushed to "
+                "pay out cable, and its encoder shows no motion: the encoder or the winch is "
+                "stuck; check both before you tighten again"
+            )
         if self._source.name == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
             return dragged
         i = int(moved_m.argmax())

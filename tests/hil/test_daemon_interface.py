@@ -29,7 +29,7 @@ from daemon_lab import (
     with_key,
     with_power,
 )
-from daemon_rig import RealDaemon, alive, until
+from daemon_rig import PATIENCE_S, RealDaemon, alive, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
@@ -111,7 +111,10 @@ def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int
                     address = f"127.0.{1 + sent // 250}.{1 + sent % 250}"
                     session.mount("http://", ConnectsFrom(address))
                     case.call_and_validate(
-                        base_url=url, session=session, headers={**RIGHT, **headers}
+                        base_url=url,
+                        session=session,
+                        headers={**RIGHT, **headers},
+                        timeout=PATIENCE_S,  # the first check of a robot file starts a process
                     )
 
             if mode is schemathesis.GenerationMode.NEGATIVE:

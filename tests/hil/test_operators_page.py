@@ -140,6 +140,7 @@ def test_a_stop_ends_a_motion_that_another_page_leads(
         if daemon.status()["state"] != "active":
             make_tight(leader)
         end_m = 2.3 if position_m(daemon)[1] < 1.9 else 1.5
+        leader.get_by_label("Speed").select_option("10")
         send_to(leader, "-400", f"{1e3 * end_m:g}")
         see(other, "Moving")
         if how == "space bar":

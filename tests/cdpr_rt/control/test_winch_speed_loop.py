@@ -71,4 +71,5 @@ def test_a_motor_whose_encoder_shows_no_motion_does_not_run_away() -> None:
         fastest_rad_s = max(fastest_rad_s, speed_rad_s)
         loop.update(feedback, torque_Nm)
     assert fastest_rad_s < 200.0
+    assert loop.stuck.all()
     assert speed_rad_s == torque_Nm[0] == 0.0

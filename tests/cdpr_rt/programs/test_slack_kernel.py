@@ -195,24 +195,3 @@ def test_a_heavy_cable_is_paid_out_a_little_and_held_against_its_tension() -> No
     assert w.high_N[0] >= pulls_N
     assert CABLE_m * feedback.position_rad[0] == pytest.approx(0.005, abs=0.001)
     assert CABLE_m * speed_rad_s == pytest.approx(kernel.TAKE_UP_m_s, rel=0.3)
-
-
-def test_a_winch_that_is_pushed_outwards_with_the_full_bound_and_does_not_turn_is_stuck() -> None:
-    """Its encoder may have failed: the motor would run away unseen."""
-    cable = OneCable()
-    cable.enter(kernel.LOOSENED)
-    assert cable.run(0.1, -0.9 * ENOUGH_N) == kernel.LOOSENED
-    assert cable.run(0.03, -ENOUGH_N) == kernel.STUCK
-    assert cable.winch.low_N[0] == cable.winch.high_N[0] == 0.0
-    turns = OneCable()
-    turns.enter(kernel.LOOSENED)
-    assert turns.run(0.05, -ENOUGH_N, -0.05) == kernel.LOOSENED
-
-
-def test_a_winch_that_does_not_turn_with_usual_friction_is_pushed_harder_fast() -> None:
-    cable = OneCable()
-    cable.enter(kernel.LOOSENED)
-    cable.run(0.01, -0.3 * ENOUGH_N)
-    usual = cable.winch.paying_out_m_s[0]
-    cable.run(0.01, -0.5 * ENOUGH_N)
-    assert cable.winch.paying_out_m_s[0] > 3.0 * usual
