@@ -50,15 +50,16 @@ class HangingSearch:
         # lengths do not agree at this rotation: a restart might find its mirror image
         found = kinematics.pose_from_lengths(lengths_m, start)
         weight = self._model.workspace(0.0, 0.0).wrenches[0]
-        planned, _ = self._model.planned_tensions(found.pose.array[None], weight[None])
+        tensions_N, _ = self._model.planned_tensions(found.pose.array[None], weight[None])
+        planned = np.ascontiguousarray(tensions_N[0])
         measured = np.full(kinematics.n, tension_N is not None)
-        given = planned[0] if tension_N is None else np.asarray(tension_N, float)
+        given = planned if tension_N is None else np.ascontiguousarray(tension_N, float)
         upward = np.zeros(4) if up is None else np.array([1.0, *up])
         tensions[kernel.FOUND] = given
         for _ in range(_MOST_STEPS):
             pose = Pose(found.pose.p, found.pose.Q)
             kernel.say_tensions(
-                planned[0], given, measured, kinematics.geometry, self._cables, known, tensions,
+                planned, given, measured, kinematics.geometry, self._cables, known, tensions,
                 1.0,
             )  # fmt: skip
             angle = kernel.turn_to_equilibrium(

@@ -21,6 +21,7 @@ from cdpr_rt.diagnosis.predictions import CableLoss, free_rotation
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.identification import windows
 from cdpr_rt.loop.warm_up import warm_up
+from cdpr_rt.model.hanging import HangingSearch
 from cdpr_rt.model.own_distribution import OwnDistribution
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.model.reachable import Reach
@@ -167,7 +168,9 @@ def _planning() -> None:
 
 
 def _losses() -> None:
-    """Simulate the loss of a cable, and the swing of a platform that turns freely."""
+    """Simulate the loss of a cable, the swing of a platform that turns freely, and how it hangs."""
+    model = platform_model_of(load_robot("spatial-8"))
+    HangingSearch(model).find(model.kinematics.lengths(model.home_pose), model.home_pose)
     free_rotation(platform_model_of(load_robot("planar-3")))
     subject = Subject(load_robot("suspended-8"))
     CableLoss(subject).swing(0, subject.platform.home_m)

@@ -33,8 +33,8 @@ from cdpr_tools.imports.mapping import (
 )
 from cdpr_tools.imports.tables import Table
 
-_GAP_S: Final = 0.05
-"""Poses farther apart are not interpolated."""
+_GAP_S, _GAP_STEPS = 0.05, 3.0
+"""Rows farther apart in time than this, and than this number of usual steps, leave a gap."""
 _FEWEST: Final = 3
 _CLOCK_STEP_S: Final = 0.02
 _LEAST_S: Final = 1.0
@@ -57,7 +57,8 @@ class Poses:
         """Return whether these times, (m,), lie between two poses without a gap."""
         after = np.clip(np.searchsorted(self.time_s, time), 1, self.time_s.size - 1)
         first, second = self.time_s[after - 1], self.time_s[after]
-        return np.asarray((time >= first) & (time <= second) & (second - first <= _GAP_S))
+        gap_s = _shortest_gap_s(self.time_s)
+        return np.asarray((time >= first) & (time <= second) & (second - first <= gap_s))
 
     def position_at(self, time: FloatArray) -> FloatArray:
         """Return interpolated positions, (m, 3)."""
@@ -80,8 +81,8 @@ def import_calibration(
     mapping = CalibrationMapping.load_file(mapping_path)
     model = platform_model_of(robot)
     table = read_any(cables)
-    measured = read_poses(table if poses == cables else read_any(poses), mapping.pose)
     notes: list[str] = []
+    measured = read_poses(table if poses == cables else read_any(poses), mapping.pose, notes)
     time, lengths, tensions = _read_cables(table, mapping, len(robot.axes), notes)
     notes += _require_same_clock(mapping_path, time, lengths, measured, model)
     row = _rows(time, measured, mapping)
@@ -166,9 +167,12 @@ def _read_cables(
     return time, lengths, values(columns.tensions, FORCES) if columns.tensions else None
 
 
-def read_poses(table: Table, columns: PoseColumns) -> Poses:
-    """Return the poses in the room; skip rows with an empty cell, where the body was hidden."""
-    table = usable(table, columns.time, (), [])
+def read_poses(table: Table, columns: PoseColumns, notes: list[str]) -> Poses:
+    """Return the poses in the room; skip rows with an empty cell, where the body was hidden.
+
+    Add to `notes` how many rows were left out.
+    """
+    table = usable(table, columns.time, (), notes)
     time = read_time(columns.time, table)
     turning = (*(columns.quaternion or ()), *(columns.rotation_vector or ()))
     late_s = {one.late_by_s(columns.time) for one in (*columns.position, *turning)}
@@ -189,6 +193,8 @@ def read_poses(table: Table, columns: PoseColumns) -> Poses:
     if np.count_nonzero(seen) < _FEWEST:
         problem = f"{np.count_nonzero(seen)} rows with a pose; allowed: {_FEWEST} or more"
         raise ProfileError(table.path, "", problem)
+    if hidden := np.count_nonzero(~seen):
+        notes.append(f"{table.path}: left out {hidden} of {seen.size} rows without a pose")
     rotation = None
     if turns is not None:
         by_quaternion = columns.rotation_vector is None
@@ -263,11 +269,16 @@ def _require_same_clock(
     ]
 
 
+def _shortest_gap_s(time: FloatArray) -> float:
+    """Return the shortest distance in time, s, across which rows are not interpolated."""
+    return max(_GAP_S, _GAP_STEPS * float(np.median(np.diff(time))))
+
+
 def _rates(time: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
     """Return rates of values (m, n) at equal steps, (n, r), 0 in gaps; and the first time."""
     grid = np.arange(time[0], time[-1], _CLOCK_STEP_S)
     after = np.clip(np.searchsorted(time, grid), 1, time.size - 1)
-    gap = time[after] - time[after - 1] > _GAP_S
+    gap = time[after] - time[after - 1] > _shortest_gap_s(time)
     rates = np.array([np.gradient(np.interp(grid, time, one), _CLOCK_STEP_S) for one in values.T])
     rates[:, gap] = 0.0
     return rates, float(grid[0])

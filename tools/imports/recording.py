@@ -77,7 +77,7 @@ def import_recording(
     table = read_any(path, winches)
     measured = None
     if mapping.pose is not None:
-        measured = read_poses(table if poses == path else read_any(poses), mapping.pose)
+        measured = read_poses(table if poses == path else read_any(poses), mapping.pose, [])
     if columns is not None:
         time = read_time(columns.time, table)
     elif measured is not None:
@@ -96,7 +96,7 @@ def import_recording(
     if measured is not None:
         rows["pose"] = _pose_rows(measured, time[chosen], robot)
     if mapping.target is not None:
-        target = read_poses(table, mapping.target)
+        target = read_poses(table, mapping.target, [])
         rows["pose_setpoint"] = _pose_rows(target, time[chosen], robot)
     start_ns = round(1e9 * time[chosen[0]]) if time[chosen[0]] > _EPOCH_S else None
     sources = dict.fromkeys((path.name, poses.name))

@@ -37,8 +37,10 @@ def cable_lengths_m(place_m: np.ndarray) -> np.ndarray:
     return np.linalg.norm((exits - anchors)[None, :, :2] - place_m[:, None], axis=2)
 
 
-def recorded(folder: Path, start_m: np.ndarray | None = None) -> tuple[Path, Path, Path]:
-    """Write lengths at 100 Hz, and an OptiTrack export at 120 Hz in another frame and clock."""
+def recorded(
+    folder: Path, start_m: np.ndarray | None = None, poses_Hz: float = 120.0
+) -> tuple[Path, Path, Path]:
+    """Write lengths at 100 Hz, and an OptiTrack export in another frame and clock."""
     start = MODEL.home[:2] if start_m is None else start_m
     (folder / "map.toml").write_text(MAP)
 
@@ -51,7 +53,7 @@ def recorded(folder: Path, start_m: np.ndarray | None = None) -> tuple[Path, Pat
     for t, row in zip(time, 1e3 * lengths, strict=True):
         rows.append(f"{1e3 * t:.0f},{row[0]:.5f},{row[1]:.5f},{row[2]:.5f},50,50,50")
     (folder / "lengths.csv").write_text("\n".join(rows) + "\n")
-    seen = np.arange(0.0, 4.0, 1.0 / 120.0)
+    seen = np.arange(0.0, 4.0, 1.0 / poses_Hz)
     lines = [
         "Format Version,1.23,Length Units,Meters",
         ",Name,P,P,P",
@@ -86,6 +88,17 @@ def test_poses_are_interpolated_at_the_times_of_the_lengths(tmp_path: Path) -> N
     assert np.abs(seen.length_m - expected).max() < 1e-4
     assert np.abs(seen.position_m[:, :2] - seen.start[:, 0, :2]).max() < 1e-9
     assert (seen.tension_N == 50.0).all()
+    assert any("left out 59 of 480 rows without a pose" in one for one in told["notes"])
+
+
+def test_poses_of_a_slow_camera_are_interpolated_but_not_across_a_gap(tmp_path: Path) -> None:
+    result = run(tmp_path, recorded(tmp_path, poses_Hz=10.0))
+    assert result.returncode == 0, result.stderr
+    data = load_data(tmp_path / "out" / "data.json")
+    assert len(data.poses) == pytest.approx(165, abs=6)
+    seen = data.observations(load_robot(ROBOT), MODEL)
+    expected = cable_lengths_m(seen.start[:, 0, :2])
+    assert np.abs(seen.length_m - expected).max() < 1e-3
 
 
 @pytest.mark.parametrize("late", ["poses", "lengths"])
