@@ -56,7 +56,8 @@ _COUNTERS: Final = np.dtype(
         ("status", "<u8"),
         ("commands", "<u8"),  # messages written since the beginning, and messages taken
         ("commands_taken", "<u8"),
-        ("commands_void", "<u8"),  # commands up to this number must no longer start a motion
+        ("stops_requested", "<u8"),  # stops that came to the service, and to the loop's own socket
+        ("stops_taken", "<u8"),
         ("urgent", "<u8"),  # stops: read before commands
         ("urgent_taken", "<u8"),
         ("replies", "<u8"),
@@ -216,17 +217,25 @@ class SharedBlock:
 
     # -- messages: commands to the loop, replies from it
 
+    @property
+    def stops(self) -> int:
+        """The number of stops so far; no command from before the last one may start motion."""
+        return int(self.counters["stops_requested"][0]) + int(self.counters["stops_taken"][0])
+
+    def count_stop(self) -> None:
+        """Prevent all commands requested so far from starting motion; for the service."""
+        self.counters["stops_requested"][0] += 1
+
     def post_command(self, value: Mapping[str, Any]) -> int:
-        """Queue a command; return its number, which its reply repeats. Raises SharedBlockError."""
-        return self._post("commands", self._commands, value)
+        """Queue a command; return its number, which its reply repeats. Raises SharedBlockError.
+
+        Its `stops` is the number of stops when it was requested, by default the present one.
+        """
+        return self._post("commands", self._commands, {"stops": self.stops, **value})
 
     def take_command(self) -> dict[str, Any] | None:
         """Return the next command, or None."""
         return self._take("commands", self._commands)
-
-    def void_commands(self) -> None:
-        """Prevent all commands queued so far from starting motion, because of a stop request."""
-        self.counters["commands_void"][0] = self.counters["commands"][0]
 
     def post_urgent(self, value: Mapping[str, Any]) -> int:
         """Queue a stop, in a separate queue from commands; return its number, which is negative.

@@ -75,8 +75,6 @@ class CommandDispatcher:
         self._transitions = transitions
         self._request_stop = request_stop
         self._stops = stops
-        self._void = 0
-        """Commands up to this number arrived before a stop from `stops`."""
         self._deferred: _Deferred | None = None
         self._reading: tuple[Command, Task[bytes]] | None = None
         """A command that reads an object of a drive."""
@@ -116,7 +114,7 @@ class CommandDispatcher:
         if self._deferred is not None and self._is_superseded(self._deferred):
             self._cancel(self._deferred, self._life.reason or "another command came first")
         if self._stops is not None and (stop := self._stops.take()) is not None:
-            self._void = self._commands[0]
+            self._counters["stops_taken"][0] += 1
             self._life.changed = True
             self._dispatch({"do": stop.do, "client": stop.client}, stop)
             if stop.is_surplus and all(to is not stop for to, _ in self._replies):
@@ -154,8 +152,7 @@ class CommandDispatcher:
         try:
             if handler is None:
                 raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._handlers)}")
-            void = max(self._void, int(self._counters["commands_void"][0]))
-            if do in _MOVING and number <= void:
+            if do in _MOVING and command.get("stops") != self._engine.block.stops:
                 raise RefusedError(f"{do}: cancelled by a later stop")
             steps = handler(command)
         except ControlError as error:

@@ -83,6 +83,8 @@ _LIVE_PATH = "/live"
 _DOWNLOADS: Final = "/recordings/"
 PROGRESS: Final = "cdpr_rt.progress"
 """Key of a scope: a number that grows while an answer is being made or sent."""
+STOPS_BEFORE: Final = "cdpr_rt.stops"
+"""Key of a scope: the number of stops when the request arrived, which its body may do later."""
 _HEADERS: Final = {
     b"content-security-policy": b"default-src 'none'; frame-ancestors 'none'",
     b"cross-origin-resource-policy": b"same-origin",
@@ -161,6 +163,7 @@ class AccessControl:
     all requests. Clients of the Unix socket all belong to one user and have no common rate limit.
     `refused` is called for every rejected client. `holds_right` returns whether a token belongs to
     the client that may move the robot. A flood from the address of that client must not block it.
+    `stops` returns the number of stops so far.
     If a key is required, one of `tickets` opens a WebSocket, or downloads one recording.
     """
 
@@ -171,12 +174,14 @@ class AccessControl:
         refused: Callable[[], None],
         holds_right: Callable[[str], bool],
         tickets: Tickets,
+        stops: Callable[[], int],
     ) -> None:
         self._app = app
         self._policy = policy
         self._refused = refused
         self._holds_right = holds_right
         self._tickets = tickets
+        self._stops = stops
         self._requests = TokenBuckets(_REQUESTS_PER_S, _BURST)
         self._failures = TokenBuckets(_FAILURES_PER_S, _FAILURES)
         self._failures_of_all = TokenBuckets(_FAILURES_OF_ALL_PER_S, _FAILURES_OF_ALL)
@@ -191,6 +196,7 @@ class AccessControl:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        scope[STOPS_BEFORE] = self._stops()
         who = ""
         try:
             who = await self._check(scope)

@@ -11,7 +11,7 @@ from http import HTTPStatus
 from typing import Annotated, Any, Final
 
 import numpy as np
-from fastapi import FastAPI, Header, Query, Request, Response
+from fastapi import Depends, FastAPI, Header, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import (
@@ -28,9 +28,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, CycleField, Row
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
-from cdpr_rt.loop.stop_socket import STOPS
 from cdpr_rt.service import http_models as models
-from cdpr_rt.service.access_control import VALID_S
+from cdpr_rt.service.access_control import STOPS_BEFORE, VALID_S
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.link import (
     DEAD,
@@ -310,6 +309,28 @@ Token = Annotated[
 ]
 
 
+def _stops_before(
+    request: Request,
+    seen: Annotated[
+        int | None,
+        Header(
+            alias="X-Stops-Seen",
+            ge=0,
+            le=2**53,
+            description="`stop_count` of the last status that the client has seen: a later stop "
+            "cancels the request, also if the network delays the request. By default the number "
+            "when the request arrives.",
+        ),
+    ] = None,
+) -> int:
+    """Return the number of stops before a request."""
+    arrived = int(request.scope[STOPS_BEFORE])
+    return arrived if seen is None else min(seen, arrived)
+
+
+StopsBefore = Annotated[int, Depends(_stops_before)]
+
+
 class _LoopRefusedError(Exception):
     def __init__(self, reply: Reply) -> None:
         super().__init__(reply.text)
@@ -525,7 +546,6 @@ _OPEN_COMMANDS: Final = {
 def _add_open_commands(app: FastAPI, service: Service) -> None:
     def add(do: str, about: str) -> None:
         async def command(body: models.ClientRequest | None = None) -> models.Done:
-            service.stops += do in STOPS
             return _done(await service.command(do, body.client if body else "somebody"))
 
         app.post(f"/{do}", responses=_REFUSALS, name=do, description=about)(command)
@@ -545,30 +565,37 @@ def _add_motion(app: FastAPI, service: Service) -> None:
 
     @app.post("/enable", responses=_REFUSALS)
     async def enable(
-        request: Request, body: models.Enable | None = None, token: Token = None
+        request: Request,
+        stops: StopsBefore,
+        body: models.Enable | None = None,
+        token: Token = None,
     ) -> models.Done:
         """Give the drives power and run a program."""
         body = body or models.Enable()
-        fields = {"program": body.program, "wanted": body.wanted}
+        fields = {"program": body.program, "wanted": body.wanted, "stops": stops}
         return await ask("enable", body, token, request, **fields)
 
     @app.post("/program", responses=_REFUSALS)
     async def program(
-        body: models.ProgramRequest, request: Request, token: Token = None
+        body: models.ProgramRequest, request: Request, stops: StopsBefore, token: Token = None
     ) -> models.Done:
         """Change to a program, without a torque step."""
-        fields = {"program": body.program, "wanted": body.wanted}
+        fields = {"program": body.program, "wanted": body.wanted, "stops": stops}
         return await ask("program", body, token, request, **fields)
 
     @app.post("/set", responses=_REFUSALS)
-    async def change(body: models.Set, request: Request, token: Token = None) -> models.Done:
+    async def change(
+        body: models.Set, request: Request, stops: StopsBefore, token: Token = None
+    ) -> models.Done:
         """Change arguments of the running program."""
-        return await ask("set", body, token, request, wanted=body.wanted)
+        return await ask("set", body, token, request, wanted=body.wanted, stops=stops)
 
     @app.post("/lengths", responses=_REFUSALS)
-    async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
+    async def lengths(
+        body: models.Set, request: Request, stops: StopsBefore, token: Token = None
+    ) -> models.Done:
         """Set the present lengths of the cables: `cable_length_m`, one for each axis or null."""
-        return await ask("lengths", body, token, request, wanted=body.wanted)
+        return await ask("lengths", body, token, request, wanted=body.wanted, stops=stops)
 
 
 def _add_drives(app: FastAPI, service: Service) -> None:
@@ -586,7 +613,7 @@ def _add_drives(app: FastAPI, service: Service) -> None:
 
     @app.post("/object", responses=_REFUSALS)
     async def drive_object(
-        body: models.ObjectRequest, request: Request, token: Token = None
+        body: models.ObjectRequest, request: Request, stops: StopsBefore, token: Token = None
     ) -> models.DriveObject:
         """Read an object of a drive; or write an integer without power, with the right to move.
 
@@ -597,7 +624,9 @@ def _add_drives(app: FastAPI, service: Service) -> None:
             reply = await service.command("object", body.client, **fields)
         else:
             gone = request.is_disconnected
-            reply = await service.command_with_right("object", body.client, token, gone, **fields)
+            reply = await service.command_with_right(
+                "object", body.client, token, gone, stops=stops, **fields
+            )
         text, texts = _done(reply).text, service.drives
         data = bytes.fromhex(text.strip("-"))
         if texts is None or body.value is not None:
@@ -622,8 +651,12 @@ def _add_procedures(app: FastAPI, service: Service) -> None:
     procedures = service.procedures
 
     @app.post("/procedure", responses=_REFUSALS)
-    async def begin(body: models.ProcedureRequest, token: Token = None) -> models.ProcedureJob:
+    async def begin(
+        body: models.ProcedureRequest, stops: StopsBefore, token: Token = None
+    ) -> models.ProcedureJob:
         """Begin a procedure: commissioning or calibration; needs the right to move throughout."""
+        if stops != service.block.stops:
+            raise ProcedureError(f"{body.procedure}: cancelled by a later stop")
         job = await procedures.begin(body, body.client, token)
         return models.ProcedureJob.model_validate(job)
 

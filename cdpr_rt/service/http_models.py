@@ -541,6 +541,8 @@ class Status(_Answer):
     """All failures, the cause first: `limit`, `axis` (from 0), `name`, `code`, `text`, ..."""
     released: bool = False
     """Whether a procedure runs the drives instead of the loop."""
+    stop_count: int
+    """Number of stops so far, for the header `X-Stops-Seen`."""
     read_only: bool
     lockstep: bool
     notices: list[str]

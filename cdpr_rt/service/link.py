@@ -174,9 +174,9 @@ class LoopLink:
         """
         self._require_loop()
         if do in STOPS:
+            self.block.count_stop()
             # commands stay in order: a stop without a reply must come after all commands that may
             # start motion
-            self.block.void_commands()
             self._take_replies()
         future = self._coalesced.get(do)
         if future is None or future.done():

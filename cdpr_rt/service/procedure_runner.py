@@ -119,6 +119,11 @@ class ProcedureRunner:
         """Whether the running procedure runs the drives of the loop's buses."""
         return self._running and self._procedure is not None and self._procedure.takes_bus
 
+    @property
+    def is_ending(self) -> bool:
+        """Whether a procedure runs that must end."""
+        return self._running and bool(self._ending)
+
     def job(self) -> dict[str, Any]:
         """Return the running procedure or the last one, as `models.ProcedureJob`."""
         procedure = self._procedure

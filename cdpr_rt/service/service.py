@@ -227,8 +227,6 @@ class Service:
         """The robot's recordings, None if this daemon does not record."""
         self.describe: Callable[[dict[str, Any]], Awaitable[dict[str, Any]]] = _describe_nothing
         """Function that describes, diagnoses or saves a robot in a separate process."""
-        self.stops = 0
-        """Number of stops that came past `/control`; they cancel the orders that wait there."""
         self.drives: DriveTexts | None = None
         """Explains what drives report."""
         self._sets: dict[tuple[Any, ...], tuple[float, str]] = {}
@@ -287,18 +285,23 @@ class Service:
         client: str,
         token: str | None,
         gone: Callable[[], Awaitable[bool]],
+        *,
+        stops: int,
         **fields: Any,
     ) -> Reply:
         """Send a command that needs the right to move; renew that right while it is carried out.
 
-        The right expires if the client has `gone` during that time. Raises LeaseError and the
-        errors of `LoopLink.command`.
+        The right expires if the client has `gone` during that time. The loop starts no motion if
+        there were more than `stops` stops. Raises LeaseError and the errors of `LoopLink.command`.
         """
         right = self.lease.renew(token, moves=True).number
+        self._note_stop()
+        if self.procedures.is_ending:
+            raise LeaseError(f"{_PROCEDURE_STOPS}; wait for its end")
         keeping = asyncio.create_task(self._keep_right(token, gone))
         try:
             # begun here, so that the client's next request comes after this command
-            return await self.command(do, client, right=right, **fields)
+            return await self.command(do, client, right=right, stops=stops, **fields)
         finally:
             keeping.cancel()
 
@@ -391,6 +394,7 @@ class Service:
             **of_loop,
             "released": self.procedures.has_bus and bool(of_loop.get("released")),
             "robot": self.robot,
+            "stop_count": self.block.stops,
             "state": link.state(),
             "reason": link.ended_how or str(of_loop.get("reason", "")),
             "loop": {
@@ -453,7 +457,6 @@ class Service:
             return
         self._stops_taken = taken
         text = f"{stops['do']} by {stops['client']}"
-        self.stops += 1
         self._cancel_work(text)
         self.events.add("command", text)
         if stops["do"] == "shutdown":  # the loop needs no launcher to stop

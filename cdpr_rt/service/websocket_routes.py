@@ -42,6 +42,14 @@ class Order(models.ClientRequest):
     program: str = ""
     wanted: dict[str, Any] = Field(default_factory=dict)
     id: int | None = None
+    stops_seen: int | None = Field(None, ge=0, le=2**53)
+
+
+class Stop(models.ClientRequest):
+    """Message of a viewer, who needs no right to move for it."""
+
+    do: Literal["hold", "disable"]
+    id: int | None = None
 
 
 _PROGRAM: Final = TypeAdapter(models.ProgramRequest)
@@ -51,8 +59,8 @@ _SET: Final = TypeAdapter(models.Set)
 class ControlSocket:
     """One accepted connection of `client`, which holds the right under `token`.
 
-    Orders are carried out one after the other, except `hold`, which overtakes all others. Orders
-    that have not begun when somebody stops the robot are rejected.
+    Orders are carried out one after the other, except `hold`, which overtakes all others. The loop
+    rejects orders from before a stop.
     """
 
     def __init__(
@@ -115,30 +123,26 @@ class ControlSocket:
             await self._refuse(None, _first_of(error))
             return
         if order.do == "hold":
-            before = [self._orders.get_nowait() for _ in range(self._orders.qsize())]
-            hold = asyncio.create_task(self._carry_out(order))
+            hold = asyncio.create_task(self._carry_out(order, 0))
             self._holds.add(hold)
             hold.add_done_callback(self._holds.discard)
-            for one, _ in before:
-                await self._cancel(one)
+            await asyncio.sleep(0.0)  # the hold counts as a stop before the next order is read
         elif self._orders.full():
             await self._refuse(order.id, f"{_MOST_WAITING} orders are already waiting")
         else:
-            self._orders.put_nowait((order, self._service.stops))
+            stops, seen = self._service.block.stops, order.stops_seen
+            self._orders.put_nowait((order, stops if seen is None else min(stops, seen)))
 
     async def _work(self) -> None:
         while True:
             order, stops = await self._orders.get()
-            if stops != self._service.stops and order.do != "renew":
-                await self._cancel(order)
-                continue
             self._is_working = True
-            await self._carry_out(order)
+            await self._carry_out(order, stops)
             self._is_working = False
 
-    async def _carry_out(self, order: Order) -> None:
+    async def _carry_out(self, order: Order, stops: int) -> None:
         try:
-            state, refused = await self._do(order)
+            state, refused = await self._do(order, stops)
         except ValidationError as error:
             await self._refuse(order.id, _first_of(error))
         except ControlError as error:
@@ -151,7 +155,7 @@ class ControlSocket:
                 why |= {"refusal": refused.refusal} if refused.refusal else {}
                 await self._reply(id=order.id, ok=False, **why)
 
-    async def _do(self, order: Order) -> tuple[str, Reply | None]:
+    async def _do(self, order: Order, stops: int) -> tuple[str, Reply | None]:
         """Return the loop's state, and its reply if it rejected the order."""
         service, client, token = self._service, self._client, self._token
         if order.do == "renew":
@@ -164,15 +168,15 @@ class ControlSocket:
         elif order.do == "program":
             program = _PROGRAM.validate_python({"program": order.program, "wanted": order.wanted})
             fields = {"program": program.program, "wanted": program.wanted}
-            reply = await service.command_with_right("program", client, token, _is_here, **fields)
+            reply = await service.command_with_right(
+                "program", client, token, _is_here, stops=stops, **fields
+            )
         else:
             change = _SET.validate_python({"wanted": order.wanted})
-            wanted = {"wanted": change.wanted}
-            reply = await service.command_with_right("set", client, token, _is_here, **wanted)
+            reply = await service.command_with_right(
+                "set", client, token, _is_here, stops=stops, wanted=change.wanted
+            )
         return reply.state, None if reply.ok else reply
-
-    async def _cancel(self, order: Order) -> None:
-        await self._refuse(order.id, f"{order.do}: cancelled by a later stop")
 
     async def _refuse(self, number: int | None, why: str) -> None:
         await self._reply(id=number, ok=False, error=why)
@@ -218,6 +222,8 @@ _MOST_ALL_CYCLES: Final = 8
 """Largest number of them that watch every cycle; each takes 2 % of a core."""
 _STATUS_S = 1.0
 _MOST_CYCLES = 1000
+_MOST_STOPS: Final = 1000
+"""Messages of one viewer, after which it must connect again."""
 
 
 class WebSocketRoutes:
@@ -292,10 +298,10 @@ class WebSocketRoutes:
 
     @asynccontextmanager
     async def _viewing(self, socket: WebSocket) -> AsyncIterator[asyncio.Task[None]]:
-        """Count a viewer; disconnect it if it reads too slowly or sends too much."""
+        """Count a viewer and obey its stops; disconnect it if it is too slow or sends too much."""
         counts = self._service.counts
         counts["live_clients"] += 1
-        gone = asyncio.create_task(_discard_incoming(socket))
+        gone = asyncio.create_task(self._obey_stops(socket))
         try:
             yield gone
         except TimeoutError:
@@ -306,6 +312,29 @@ class WebSocketRoutes:
         finally:
             counts["live_clients"] -= 1
             gone.cancel()
+
+    async def _obey_stops(self, socket: WebSocket) -> None:
+        """Obey a viewer's stops; return when it has gone, or sends too much."""
+        obeying: set[asyncio.Task[None]] = set()
+        for _ in range(_MOST_STOPS):
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            with suppress(ValidationError):
+                stop = Stop.model_validate_json(message.get("text") or "")
+                obeying.add(task := asyncio.create_task(self._obey(socket, stop)))
+                task.add_done_callback(obeying.discard)
+            await asyncio.sleep(0.05)
+
+    async def _obey(self, socket: WebSocket, stop: Stop) -> None:
+        try:
+            reply = await self._service.command(stop.do, stop.client)
+            error = None if reply.ok else reply.text or "refused"
+        except ControlError as failure:
+            error = str(failure)
+        answer = {"kind": "reply", "id": stop.id, "ok": error is None, "error": error}
+        with suppress(TimeoutError, WebSocketDisconnect):
+            await send(socket, json.dumps(answer))
 
     def _cycle(self, updates: _Updates, fields: tuple[str, ...]) -> str:
         """Return the newest cycle as text, "" if it was sent before."""
@@ -360,16 +389,8 @@ class _Updates:
             yield {"kind": "event", "event": event}
         now = time.monotonic()
         holder = service.lease.holder()
-        seen = (id(service.link.status()), service.link.state(), holder and holder.client)
+        link = service.link
+        seen = (id(link.status()), link.state(), holder and holder.client, service.block.stops)
         if seen != self._seen or now - self._told_s > _STATUS_S:
             self._seen, self._told_s = seen, now
             yield {"kind": "status", "status": service.status()}
-
-
-async def _discard_incoming(socket: WebSocket) -> None:
-    """Discard messages of a viewer; return when it has gone, or sends too much."""
-    for _ in range(1000):
-        message = await socket.receive()
-        if message["type"] == "websocket.disconnect":
-            return
-        await asyncio.sleep(0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from daemon_rig import PATIENCE_S, RealDaemon, alive, until, write_robot
 
 import cdpr_rt as cdpr
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.loop.stop_socket import STOP_SUFFIX, send_stop
 from cdpr_tools.client.client import open_daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.daemon.loop_file import LoopFile, launcher_pid
@@ -124,6 +126,32 @@ def test_the_robot_holds_after_its_script_was_killed(daemon: RealDaemon) -> None
     status = until(lambda: (now := daemon.status())["program"] != "pid" and now, 15.0)
     assert (status["state"], status["program"]) == ("active", "hold"), status["reason"]
     assert "nobody holds the right to move" in status["reason"]
+
+
+def test_an_enable_whose_body_comes_after_a_stop_gives_no_power(daemon: RealDaemon) -> None:
+    with cdpr.connect(socket=daemon.socket) as robot:
+        robot.disable()
+    stop, body = daemon.socket.with_suffix(STOP_SUFFIX), b'{"program": "hold"}'
+    for accepted in (False, True):
+        with (
+            open_daemon(None, daemon.socket, None, None) as client,
+            socket.socket(socket.AF_UNIX) as slow,
+        ):
+            token = client.post("/control", {"client": "slow", "ttl_s": 10.0})["token"]
+            slow.settimeout(PATIENCE_S)
+            slow.connect(str(daemon.socket))
+            head = f"""POST /enable HTTP/1.1\r\nHost: robot\r\nX-Control-Token: {token}\r
+Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"""
+            slow.sendall(head.encode() + body[:-1])
+            client.get("/status")  # answered after the head of the enable was read
+            if not accepted:
+                assert send_stop(stop, "disable", "fast", PATIENCE_S)
+            slow.sendall(body[-1:])
+            answer = slow.recv(65536)
+            client.release(token)
+        assert (b"200 OK" in answer) is accepted, answer
+        assert (b"cancelled by a later stop" in answer) is not accepted
+        assert daemon.status()["state"] == ("active" if accepted else "ready")
 
 
 @pytest.mark.long

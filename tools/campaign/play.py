@@ -237,7 +237,7 @@ class Player:
         self._program("jog", wanted | {"timeout_s": 0.6})
 
     def _do_stop(self, _: Action) -> None:
-        self._rig.block.void_commands()
+        self._rig.block.count_stop()
         self._post({"do": "disable"}, urgent=True)
 
     def _do_power_off(self, _: Action) -> None:

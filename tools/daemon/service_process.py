@@ -251,7 +251,10 @@ async def _wait_for_end(ended: asyncio.Event, settings: RunSettings, block: Shar
 
 def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Server]:
     """Return the servers: at the Unix socket, and at the TCP sockets bound by the launcher."""
-    shared = (service.count_refusal, service.lease.is_held_by, service.tickets)
+    shared = (
+        service.count_refusal, service.lease.is_held_by, service.tickets,
+        lambda: service.block.stops,
+    )  # fmt: skip
     unix = listen_unix(settings.socket)
     servers = [Server(AccessControl(app, AccessPolicy(local=True), *shared), unix)]
     if (address := settings.http) is not None:

@@ -87,6 +87,9 @@ class MadeUpLoop:
         if command["do"] == "program" and command["program"] == "pose":
             text = "pose: the cables are not tight; run tighten first"
             return {"ok": False, "text": text, "refusal": NOT_TIGHT, "state": "ready"}
+        if command.get("stops", self.block.stops) != self.block.stops:
+            text = f"{command['do']}: cancelled by a later stop"
+            return {"ok": False, "text": text, "state": str(self.status["state"])}
         if command["do"] == "enable":
             self.publish(state="active", program=command["program"])
         return {"ok": True, "text": "", "state": str(self.status["state"])}
@@ -146,7 +149,12 @@ class Rig:
         servers = [
             Server(
                 AccessControl(
-                    app, policy, service.count_refusal, service.lease.is_held_by, service.tickets
+                    app,
+                    policy,
+                    service.count_refusal,
+                    service.lease.is_held_by,
+                    service.tickets,
+                    lambda: self.block.stops,
                 ),
                 listener,
             )

@@ -313,7 +313,7 @@ def _asking(
     async def receive() -> dict[str, Any]:
         return {"type": "http.request"}
 
-    access = AccessControl(app, policy, lambda: None, holds_right, Tickets())
+    access = AccessControl(app, policy, lambda: None, holds_right, Tickets(), lambda: 0)
 
     async def ask(method: str = "GET", path: str = "/control", **headers: str) -> int:
         sent: list[dict[str, Any]] = []

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
 from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
 
@@ -41,6 +42,24 @@ def test_every_stop_of_a_flood_is_accepted(rig: Rig) -> None:
         for thread in threads:
             thread.join()
     assert set(seen) == {200}
+
+
+@pytest.mark.parametrize("path", ["/enable", "/program", "/set", "/procedure"])
+def test_a_request_older_than_a_stop_by_what_its_client_has_seen_is_rejected(
+    rig: Rig, path: str
+) -> None:
+    body: dict[str, Any] = {"/program": {"program": "jog"}, "/set": {"wanted": {}}}.get(path, {})
+    if path == "/procedure":
+        body = {"procedure": "commission", "axes": ["left"], "detached": True}
+    with httpx.Client(base_url=rig.guarded_url, headers=RIGHT) as client:
+        token = client.post("/control", json={"client": "maria", "ttl_s": 10.0}).json()["token"]
+        seen = client.get("/status").json()["stop_count"]
+        assert client.post("/hold").status_code == 200
+        headers = {"X-Control-Token": token, "X-Stops-Seen": str(seen)}
+        answer = client.post(path, json={**body, "client": "maria"}, headers=headers)
+        assert answer.status_code == 409
+        assert "cancelled by a later stop" in answer.json()["error"]
+    assert rig.loop.status["state"] == "ready"
 
 
 def test_a_stop_taken_by_the_loop_is_one_event_and_cancels_planning(rig: Rig) -> None:

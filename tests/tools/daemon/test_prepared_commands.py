@@ -78,7 +78,7 @@ def test_another_command_cancels_a_preparation(rig: LoopRig, urgent: bool) -> No
     number = rig.block.post_command({**asked, "right": rig.right})
     rig.turn(1)
     if urgent:
-        rig.block.void_commands()
+        rig.block.count_stop()
     (rig.block.post_urgent if urgent else rig.block.post_command)({"do": "hold"})
     rig.turn(20)
     answers = {answer["to"]: answer for answer in iter(rig.block.take_reply, None)}

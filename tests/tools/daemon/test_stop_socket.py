@@ -88,6 +88,17 @@ def test_commands_queued_before_a_stop_do_not_move_after_it(
     assert jogging.loop.engine.program.name == "jog"
 
 
+def test_a_command_requested_before_a_stop_and_posted_after_it_does_not_move(
+    jogging: LoopRig, socket_path: Path
+) -> None:
+    before = jogging.block.stops
+    send(socket_path, b'{"do": "hold"}')
+    jogging.turn(2)
+    refused = jogging.command("program", **JOG, stops=before)
+    assert refused["text"] == "program: cancelled by a later stop"
+    assert jogging.loop.engine.program.name == "hold"
+
+
 def test_disable_is_answered_when_power_is_off_and_is_idempotent(
     jogging: LoopRig, socket_path: Path
 ) -> None:

@@ -137,7 +137,7 @@ def test_a_stop_precedes_a_full_queue(active: LoopRig) -> None:
     active.obeyed("program", **JOG)
     for _ in range(MESSAGES):
         block.post_command({"do": "program", "client": "test", "right": active.right, **JOG})
-    block.void_commands()
+    block.count_stop()
     number = block.post_urgent({"do": "hold", "client": "another"})
     active.turn(1)
     assert active.loop.engine.program.name == "hold"
