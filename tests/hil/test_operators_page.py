@@ -235,6 +235,27 @@ def test_a_stopped_move_continues_to_its_target(
         until(lambda: position_m(daemon) == pytest.approx([0.3, 2.2], abs=2e-3))
 
 
+def test_the_scope_commands_a_step_and_shows_its_figures(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        page.get_by_role("link", name="Scope", exact=True).click()
+        page.get_by_label("Step of").select_option("y")
+        page.get_by_role("combobox", name="by", exact=True).select_option(label="10 mm")
+        press(page, "Show position and set-point")
+        before_m = position_m(daemon)[1]
+        press(page, "Step −10 mm")
+        figures = page.get_by_role("region", name="Cursors").locator("dl")
+        figures.get_by_text("Rise time").wait_for()
+        assert position_m(daemon)[1] == pytest.approx(before_m - 0.01, abs=1e-3)
+        names, texts = (figures.locator(tag).all_inner_texts() for tag in ("dt", "dd"))
+        values = dict(zip(names, texts, strict=True))
+        begin, end = (float(one) for one in values["Step"].removesuffix(" m").split(" to "))
+        assert end - begin == pytest.approx(-0.01, abs=1e-3)
+        assert 0.0 < float(values["Rise time, 10 to 90 %"].removesuffix(" s")) < 1.0
+
+
 def test_every_view_is_reachable_with_the_keyboard_and_has_the_stop(
     daemon: RealDaemon, browser: playwright_api.Browser
 ) -> None:
@@ -279,6 +300,54 @@ def test_a_stop_cancels_a_move_that_still_waits_for_the_right_to_move(
         held_up[0].continue_()
         page.get_by_role("alert").filter(has_text="you have stopped the robot").wait_for()
         assert position_m(daemon) == pytest.approx(before_m, abs=2e-3)
+
+
+def test_a_stop_does_not_wait_for_a_connection_of_other_pages(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        pages = [page, *(page.context.new_page() for _ in range(6))]
+        for one in pages[1:]:
+            one.goto(address(daemon))
+            see(one, "Holding the platform")
+        page.evaluate(  # the answer to a wrong key takes a second
+            """() => {
+                globalThis.__waiting = 90;
+                const headers = { Authorization: "Bearer a-guess" };
+                for (let k = 0; k < 90; k++)
+                    fetch(`/fields?${k}`, { headers }).then(() => __waiting--);
+            }"""
+        )
+        before = daemon.status()["stop_count"]
+        pages[-1].keyboard.press("Space")
+        until(lambda: daemon.status()["stop_count"] > before)
+        assert page.evaluate("__waiting") > 6, "the stop has waited for a connection"
+
+
+def test_a_page_in_the_background_keeps_the_right_for_a_motion_only_and_says_so(
+    daemon: RealDaemon, browser: playwright_api.Browser
+) -> None:
+    with opened(browser, address(daemon)) as page:
+        see(page, "Holding the platform")
+        end_mm = 2200 if position_m(daemon)[1] < 1.9 else 1600
+        page.evaluate(  # as a browser slows down timers of pages that are hidden for five minutes
+            """() => {
+                Object.defineProperty(document, "hidden", { get: () => globalThis.__hidden });
+                const start = setInterval;
+                globalThis.setInterval = (work, ms) =>
+                    start(() => globalThis.__hidden || work(), ms);
+            }"""
+        )
+        page.get_by_label("Speed", exact=True).select_option("25")
+        send_to(page, "0", str(end_mm))
+        see(page, "Moving")
+        page.evaluate("globalThis.__hidden = true")
+        until(lambda: position_m(daemon)[1] == pytest.approx(1e-3 * end_mm, abs=2e-3))
+        page.get_by_role("alert").filter(
+            has_text="While this page was in the background"
+        ).wait_for()
+        assert not daemon.status()["control"]["held"]
 
 
 def test_a_page_with_the_key_of_an_earlier_run_takes_the_present_address(

@@ -1,17 +1,17 @@
 // What acts: the stop, the next step, moves and jogging.
 import { useEffect, useState } from "preact/hooks";
-import { clientName, command, hasKey, request, setKey } from "./daemon";
+import { clientName, command, hasKey, request, setKey, stop as order } from "./daemon";
 import { STEP_LABELS, type Situation, type Step, situationOf } from "./situation";
 import { store, useStore } from "./store";
 
 const stop = (): void => {
-  store.right.stop();
-  void store.attempt(() => command("/hold"));
+  store.right.cancel();
+  void store.attempt(() => order("hold"));
 };
 
 const powerOff = (): void => {
   store.right.cancel();
-  void store.attempt(() => command("/disable"));
+  void store.attempt(() => order("disable"));
 };
 
 /** The stop acts on one press or on the space bar, with or without the right to move. */

@@ -55,15 +55,14 @@ function Guide({ title, children }: { title: string; children: ComponentChildren
 const Met = ({ is, children }: { is: boolean; children: ComponentChildren }) => <li class={is ? "on" : "busy"}>{is ? "✓ " : "○ "}<span>{children}</span></li>;
 
 const GRAVITY_m_s2 = 9.81;
-const AUTO = 0;
 /** The first pose must be this close to home, in each direction; the default of home_tolerance_m. */
 const AT_HOME_m = 0.05;
-const COUNTS = [AUTO, 20, 30, 50, 100];
+const FEWEST = 2, MOST = 200;
 
 /** Measure poses, look at the verdict, adopt, check. */
 function Geometry({ job, start }: Props) {
   const { description, status } = useStore();
-  const [count, setCount] = useState(AUTO);
+  const [count, setCount] = useState("");
   const [camera, setCamera] = useState(false);
   const platform = description!.platform;
   if (!platform) return <section class="card"><p>This robot has no platform: there is no geometry to calibrate.</p></section>;
@@ -74,6 +73,8 @@ function Geometry({ job, start }: Props) {
   const redundant = description!.axes.length > platform.controlled.length;
   const hasCamera = Boolean(job?.offers["simulated_camera"]);
   const busy = job?.running ?? false;
+  const poses = count.trim() ? Number(count) : null;
+  const valid = poses === null || (Number.isInteger(poses) && poses >= FEWEST && poses <= MOST);
   return (
     <>
       <Guide title="Calibrate the geometry">
@@ -90,12 +91,11 @@ function Geometry({ job, start }: Props) {
           <h3>Measure</h3>
           <p>The platform moves through poses in its box of targets. The robot reads its cables at each. Nothing is adopted yet.</p>
           <div class="row">
-            <label>Poses <select value={count} onChange={(event) => setCount(Number(event.currentTarget.value))}>
-              {COUNTS.map((one) => <option key={one} value={one}>{one === AUTO ? "as many as help" : one}</option>)}
-            </select></label>
+            <label>Poses <input class="number" inputMode="numeric" placeholder="auto" value={count} aria-invalid={!valid} onInput={(event) => setCount(event.currentTarget.value)} /></label>
+            <span class={valid ? "quiet" : "fault"}>{valid ? "empty: as many as improve the result, up to 100" : `Allowed: ${FEWEST} to ${MOST}`}</span>
             {hasCamera && <label class="consent"><input type="checkbox" checked={camera} onChange={(event) => setCamera(event.currentTarget.checked)} /> <span>with the camera on the platform</span></label>}
           </div>
-          <div class="row"><button class="go" disabled={!tight || busy || Boolean(inForce)} onClick={() => void start({ procedure: "measure", poses: count === AUTO ? null : count, camera })}>Measure</button></div>
+          <div class="row"><button class="go" disabled={!tight || busy || !valid || Boolean(inForce)} onClick={() => void start({ procedure: "measure", poses, camera })}>Measure</button></div>
         </li>
         <li>
           <h3>Judge and adopt</h3>

@@ -71,15 +71,14 @@ export function setKey(text: string): void {
 }
 
 export async function request<T>(
-  method: "GET" | "POST" | "PUT" | "DELETE", path: Path, body?: unknown, token?: string,
+  method: "GET" | "POST" | "PUT" | "DELETE", path: Path, body?: unknown, more: Record<string, string> = {}, signal: AbortSignal | null = null,
 ): Promise<T> {
-  const headers: Record<string, string> = {};
+  const headers = { ...more };
   if (key) headers["Authorization"] = `Bearer ${key}`;
   if (body !== undefined) headers["Content-Type"] = "application/json";
-  if (token) headers["X-Control-Token"] = token;
   let answer: Response;
   try {
-    answer = await fetch(path, { method, headers, body: body === undefined ? null : JSON.stringify(body) });
+    answer = await fetch(path, { method, headers, signal, body: body === undefined ? null : JSON.stringify(body) });
   } catch {
     throw new Rejected("The daemon does not answer. Is `cdpr run` still running?");
   }
@@ -124,6 +123,31 @@ export interface LiveListener {
   connected(value: boolean): void;
 }
 
+interface Answer { ok: boolean; error: string | null }
+
+let live: WebSocket | null = null;
+let stops = 0;
+const stopping = new Map<number, (answer: Answer) => void>();
+const SOON_MS = 300;
+
+/**
+ * Stop over the open connection, on which nothing waits; without an answer also by a request.
+ *
+ * All pages of a browser share six connections for requests, which others may occupy for minutes.
+ */
+export async function stop(what: "hold" | "disable"): Promise<void> {
+  const id = ++stops, order = { client: clientName() };
+  const open = live?.readyState === WebSocket.OPEN;
+  const answered = new Promise<Answer>((resolve) => stopping.set(id, resolve));
+  if (open) live!.send(JSON.stringify({ ...order, do: what, id }));
+  let answer = await Promise.race([answered, new Promise<null>((resume) => setTimeout(resume, open ? SOON_MS : 0, null))]);
+  const asking = new AbortController();
+  answer ??= await Promise.race([answered, request("POST", `/${what}`, order, {}, asking.signal).then(() => null)]);
+  asking.abort(); // a request that still waits for a connection must not stop a later motion
+  stopping.delete(id);
+  if (answer && !answer.ok) throw new Rejected(answer.error ?? "refused");
+}
+
 /** Follow the daemon for as long as the page is open; a lost connection is tried again. */
 export function follow(listener: LiveListener): void {
   void (async () => {
@@ -142,6 +166,7 @@ export function follow(listener: LiveListener): void {
 function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
   return new Promise((ended) => {
     let heard = Date.now();
+    live = socket;
     const watching = setInterval(() => {
       if (Date.now() - heard > SILENT_MS) socket.close();
     }, RETRY_MS);
@@ -151,6 +176,7 @@ function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
       if (message.kind === "cycle") listener.cycle(message);
       else if (message.kind === "status") listener.status(message.status);
       else if (message.kind === "event") listener.event(message.event);
+      else if (message.kind === "reply") stopping.get(message.id)?.(message);
       else if (message.kind === "description") listener.description(message.description);
       listener.connected(true);
     };
@@ -169,16 +195,21 @@ const LATE_MS = 5000;
 /**
  * The right to move, held for as long as its connection lives.
  *
- * If this page is closed or goes silent for `TTL_S`, the daemon brakes the robot and holds it.
+ * If this page is closed or goes silent for `TTL_S`, the daemon brakes the robot and holds it. A browser slows down the
+ * timers of a page in the background; `renew` keeps the right there while something of it runs.
  */
 export class Right {
   #socket: WebSocket | null = null;
   #token = "";
   #number = 0;
   #stops = 0;
+  #renewed = 0;
   #taking: Promise<void> | null = null;
-  #waiting = new Map<number, (answer: { ok: boolean; error: string | null }) => void>();
+  #waiting = new Map<number, (answer: Answer) => void>();
+  /** The number of stops that this page knows; a later one cancels a step that is on its way. */
+  seen = 0;
   changed: () => void = () => undefined;
+  lost: (why: string) => void = () => undefined;
 
   get held(): boolean {
     return this.#token !== "";
@@ -189,20 +220,20 @@ export class Right {
     this.#stops++;
   }
 
-  /** The same, and stop on the connection on which the other steps were sent, after them. */
-  stop(): void {
-    this.cancel();
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify({ do: "hold", client: clientName() }));
-  }
-
-  /** Take the right for a step; throws `Rejected` with the holder's name, or if the step came too late or was stopped. */
-  async #takeForStep(): Promise<void> {
-    if (this.held) return;
+  /**
+   * Take the right for a step; return the number of stops before it.
+   *
+   * Throws `Rejected` with the holder's name, or if the step came too late or was stopped.
+   */
+  async #takeForStep(): Promise<number> {
+    const { seen } = this;
+    if (this.held) return seen;
     const stops = this.#stops, began = performance.now();
     this.#taking ??= this.#take().finally(() => (this.#taking = null));
     await this.#taking;
     if (this.#stops !== stops) throw new Rejected("Cancelled: you have stopped the robot.");
     if (performance.now() - began > LATE_MS) throw new Rejected("The daemon answered late, so nothing was started. Try again.");
+    return seen;
   }
 
   async #take(): Promise<void> {
@@ -221,23 +252,35 @@ export class Right {
         }
       };
       socket.onclose = ({ reason }) => {
-        if (this.#socket === socket) this.#forget(reason || "The connection to the daemon was lost.");
+        if (this.#socket === socket) {
+          this.#forget(reason || "The connection to the daemon was lost.");
+          this.lost(reason);
+        }
         failed(new Rejected(reason || "The daemon did not give this page the right to move."));
       };
     });
     const renewing = setInterval(() => {
       if (this.#socket !== socket) clearInterval(renewing);
-      else if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ do: "renew" }));
+      else this.renew();
     }, RENEW_MS);
   }
 
+  /** Extend the right, if it is held, at most every `RENEW_MS`. */
+  renew(): void {
+    const now = performance.now();
+    if (this.#socket?.readyState !== WebSocket.OPEN || now - this.#renewed < 0.9 * RENEW_MS) return;
+    this.#renewed = now;
+    this.#socket.send(JSON.stringify({ do: "renew" }));
+  }
+
   release(): void {
-    this.#socket?.close();
+    const socket = this.#socket;
+    this.#forget("This page has given the right back.");
+    socket?.close();
   }
 
   async enable(): Promise<void> {
-    await this.#takeForStep();
-    await request("POST", "/enable", { client: clientName(), program: "hold" }, this.#token);
+    await this.request("/enable", { client: clientName(), program: "hold" });
   }
 
   async program(program: string, wanted: Record<string, unknown> = {}): Promise<void> {
@@ -251,24 +294,29 @@ export class Right {
 
   /** Carry out a request that needs the right to move. */
   async request<T>(path: Path, body: unknown): Promise<T> {
-    await this.#takeForStep();
-    return request<T>("POST", path, body, this.#token);
+    const seen = await this.#takeForStep();
+    return request<T>("POST", path, body, { "X-Control-Token": this.#token, "X-Stops-Seen": String(seen) });
   }
 
   async #order(order: Record<string, unknown>): Promise<void> {
-    await this.#takeForStep();
+    const stops_seen = await this.#takeForStep();
     const id = ++this.#number;
-    const answer = await new Promise<{ ok: boolean; error: string | null }>((resolve) => {
+    const answer = await new Promise<Answer>((resolve) => {
       this.#waiting.set(id, resolve);
-      this.#socket?.send(JSON.stringify({ ...order, id, client: clientName() }));
+      this.#socket?.send(JSON.stringify({ ...order, id, stops_seen, client: clientName() }));
     });
     if (!answer.ok) throw new Rejected(answer.error ?? "refused");
   }
 
   /** Begin a procedure, which ends if this page loses the right to move. */
   async procedure(wanted: Wanted): Promise<Job> {
-    await this.#takeForStep();
-    return request<Job>("POST", "/procedure", { client: clientName(), ...wanted }, this.#token);
+    const held = this.held;
+    try {
+      return await this.request<Job>("/procedure", { client: clientName(), ...wanted });
+    } catch (error) {
+      if (!held) this.release(); // it was taken for this procedure
+      throw error;
+    }
   }
 
   #forget(why: string): void {
@@ -291,7 +339,7 @@ export function clientName(): string {
 }
 
 /** Commands that need no right to move. */
-export const command = (path: "/configure" | "/check" | "/acknowledge" | "/hold" | "/disable"): Promise<unknown> =>
+export const command = (path: "/configure" | "/check" | "/acknowledge"): Promise<unknown> =>
   request("POST", path, { client: clientName() });
 
 /** Let the browser save a file of a recording; it arrives piece by piece. */

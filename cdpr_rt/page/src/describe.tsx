@@ -3,7 +3,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { components } from "./api";
 import { type Description, type Platform, Rejected, clientName, request } from "./daemon";
-import { RobotScene } from "./scene";
+import { type RobotScene, drawnIn } from "./scene";
 import { store, useStore } from "./store";
 import "./procedure.css";
 
@@ -169,12 +169,8 @@ function Field({ question, typed, set }: { question: Question; typed: string | u
 function Picture({ platform }: { platform: Platform }) {
   const host = useRef<HTMLDivElement>(null), scene = useRef<RobotScene | null>(null);
   useEffect(() => {
-    try {
-      scene.current = new RobotScene(host.current!);
-      scene.current.numbered = true;
-    } catch {
-      host.current!.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
-    }
+    scene.current = drawnIn(host.current!);
+    if (scene.current) scene.current.numbered = true;
     return () => scene.current?.close();
   }, []);
   useEffect(() => {

@@ -3,7 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
 import { type Border, type Cycle, type DaemonEvent, type Description, hasKey, request } from "./daemon";
 import { anglesOf, go, positionsOf, presentPose, rounded, targetOf, useHindrance } from "./move";
-import { RobotScene, tensionColour } from "./scene";
+import { type RobotScene, drawnIn, tensionColour } from "./scene";
 import { progressOf } from "./situation";
 import { store, useCycles, useStore } from "./store";
 import { type Curve, SPAN_S, Trend, curveColour } from "./trend";
@@ -24,12 +24,7 @@ export function RobotView() {
   const host = useRef<HTMLDivElement>(null);
   const scene = useRef<RobotScene | null>(null);
   useEffect(() => {
-    try {
-      scene.current = new RobotScene(host.current!);
-    } catch {
-      host.current!.classList.add("undrawn");
-      host.current!.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
-    }
+    scene.current = drawnIn(host.current!);
     return () => scene.current?.close();
   }, []);
   useEffect(() => {

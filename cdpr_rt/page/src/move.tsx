@@ -1,7 +1,7 @@
 // Moves of the platform: to a target, by steps, onto its stand; pause and continue.
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
-import { type Platform, command, hasKey } from "./daemon";
+import { type Platform, hasKey, stop } from "./daemon";
 import { progressOf } from "./situation";
 import { store, useStore } from "./store";
 
@@ -51,7 +51,7 @@ export function Move() {
       <div class="row">
         {isHeld
           ? <button onClick={run("pose", { resume: true })} title="Continue to the target of the move that was stopped">Continue the move</button>
-          : <button disabled={!isMoving} onClick={() => void store.attempt(() => command("/hold"))} title="Stop here, to continue later">Pause</button>}
+          : <button disabled={!isMoving} onClick={() => void store.attempt(() => stop("hold"))} title="Stop here, to continue later">Pause</button>}
         <button onClick={run("tighten")} title="Measure the cables' lengths again, and friction">Tighten again</button>
         <button onClick={run("lower")} title="Move home and down onto the stand">Lower</button>
         {right.held && <button class="plain" onClick={() => right.release()}>Give up the right to move</button>}

@@ -14,7 +14,8 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
   const { connected } = useStore();
   const [job, setJob] = useState<Job | null>(latest);
   const show = (value: Job): void => {
-    const ended = latest?.running && !value.running && value.client === clientName();
+    const mine = value.client === clientName(), ended = latest?.running && !value.running && mine;
+    store.procedure = value.running && mine;
     setJob((latest = value));
     const { status } = store; // a motion that has begun since keeps the right
     if (ended && (status?.state !== "active" || status.program === "hold")) store.right.release();
@@ -25,14 +26,15 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
     const end = repeat(async () => {
       try {
         const value = await request<Job>("GET", "/procedure");
-        if (shown && (JSON.stringify(value) !== JSON.stringify(latest))) show(value);
+        if (JSON.stringify(value) !== JSON.stringify(latest)) show(value);
       } catch {
         // the daemon is away; tried again
       }
+      if (!shown && !store.procedure) end();
     }, LOOK_MS);
     return () => {
-      shown = false;
-      end();
+      shown = false; // in another view, the right is given back when the procedure has ended
+      if (!store.procedure) end();
     };
   }, [connected]);
   return { job, start: (wanted) => store.attempt(async () => show(await store.right.procedure(wanted))) };

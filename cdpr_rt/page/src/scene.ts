@@ -369,3 +369,14 @@ export class RobotScene {
     });
   }
 }
+
+/** Return the scene in `host`; null, with the reason there, if the browser cannot draw it. */
+export function drawnIn(host: HTMLElement): RobotScene | null {
+  try {
+    return new RobotScene(host);
+  } catch {
+    host.classList.add("undrawn");
+    host.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
+    return null;
+  }
+}

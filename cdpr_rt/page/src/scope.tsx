@@ -4,6 +4,7 @@ import { linkTo, useView } from "./address";
 import { type Columns, type Description, type Quantity, request, saveAs } from "./daemon";
 import { LiveFeed, type Samples, type ScopeCurve, type Trigger, asCsv, between, curvesOf, figure, placeOf, stepFigures, wordsOf } from "./scope_data";
 import { ScopePlot } from "./scope_plot";
+import { Step } from "./step";
 import { store, useStore } from "./store";
 import { curveColour } from "./trend";
 import "./data.css";
@@ -72,6 +73,10 @@ function ScopeOf({ known, quantities, description }: { known: ScopeCurve[]; quan
     setCursors([null, null]);
     live.proceed();
   };
+  const showStep = (from_s: number, until_s: number): void => {
+    zoomTo(from_s - 0.1 * (until_s - from_s), until_s);
+    setCursors([from_s, until_s]);
+  };
   return (
     <>
       <section class="card scope" aria-label="Curves">
@@ -97,6 +102,7 @@ function ScopeOf({ known, quantities, description }: { known: ScopeCurve[]; quan
       {still
         ? <Cursors samples={samples} window={shown} curves={curves} cursors={cursors} change={setCursors} zoomTo={zoomTo} />
         : <section class="card"><h2>Cursors</h2><p class="quiet">Pause to place cursors: they show values, differences and the figures of a step response.</p></section>}
+      {file === null && <Step description={description} shown={curves.map((one) => one.id)} finished={showStep} show={(ids) => { setTrigger(NO_TRIGGER); choose(ids); proceed(); }} />}
       <Parameters />
     </>
   );

@@ -17,6 +17,8 @@ class Store {
   target: string[] | null = null;
   /** The path that was planned last, or is planned now. */
   path: Planned | null = null;
+  /** Whether a procedure of this page runs. */
+  procedure = false;
   /** Whether the last move was stopped before its end. */
   interrupted = false;
   /** The cycles of the last `KEPT_S`, so that a view that is opened has curves. */
@@ -28,6 +30,11 @@ class Store {
 
   constructor() {
     this.right.changed = () => this.change();
+    this.right.lost = (why) => this.change({
+      rejected: document.hidden
+        ? "While this page was in the background, its browser slowed it down. So the page lost the right to move; a motion would have held. The next step takes the right again."
+        : `This page has lost the right to move${why ? `: ${why}` : ""}. The next step takes it again.`,
+    });
     follow({
       description: (value) => this.change({ description: value.axes ? value : null }), // empty while the loop starts
       status: (value) => this.#look(value),
@@ -51,7 +58,10 @@ class Store {
   }
 
   #look(status: Status): void {
+    this.right.seen = status.stop_count;
     const progress = progressOf(status);
+    const moves = status.state === "active" && (progress.done ?? 1) < 1;
+    if (document.hidden && (moves || this.procedure)) this.right.renew();
     if (status.program === "pose" && progress.target_m) this.interrupted = (progress.done ?? 1) < 1;
     else if (status.program !== "hold" || status.state !== "active") this.interrupted = false;
     const plan = progress.path?.plan;
