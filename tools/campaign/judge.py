@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Final
@@ -25,6 +25,10 @@ _DEAD_WITHIN_S: Final = 3.0
 Drives that do not detect standstill end a quick stop after 2 s.
 """
 _FELL_m: Final = 0.05
+_FALLS_m: Final = 0.005
+_RELEASED_S: Final = 0.5
+"""Longest time from a release of a platform until it has come down 5 mm."""
+_CARRIED_S: Final = 0.1
 _OVER: Final = 1.25
 _RISE_MB: Final = 150.0
 
@@ -79,9 +83,8 @@ class Judge:
         self.limits = limits_of(robot)
         self.truth, self.n = played.truth, len(robot.axes)
         self.end = played.statuses[-1] if played.statuses else {}
-        self.causes = [
-            Cause(one, played.began_s) for one in played.scenario.faults if one["value"] != 0
-        ]
+        faults = played.scenario.faults
+        self.causes = [Cause(one, faults, played.began_s) for one in faults if one["value"] != 0]
 
     @property
     def disturbed_s(self) -> float:
@@ -113,14 +116,29 @@ class Judge:
         then = [status for status in self.played.statuses if status["at_s"] <= at_s]
         return bool(then) and then[-1]["state"] == "active" and then[-1]["reacting"] == "none"
 
-    def off_since(self) -> float | None:
-        """Return the bus time since which no motor has had torque; None if a motor has torque."""
-        powered = np.flatnonzero((np.abs(self.truth["torque_Nm"]) > _TORQUE_Nm).any(axis=1))
-        if not powered.size:
-            return float(self.truth["time_s"][0])
-        if powered[-1] == self.truth.size - 1:
-            return None
-        return float(self.truth["time_s"][powered[-1]])
+    def falls(self) -> list[Fall]:
+        """Return when and how far the platform came down while no motor had torque."""
+        found, time_s = [], self.truth["time_s"]
+        powerless = (np.abs(self.truth["torque_Nm"]) <= _TORQUE_Nm).all(axis=1)
+        for name, at_s in self.played.done:
+            if name == "put-back":
+                powerless[np.abs(time_s - at_s) < _CARRIED_S] = False
+        edges = np.flatnonzero(np.diff(np.r_[False, powerless, False]))
+        for first, end in edges.reshape(-1, 2):
+            height_m = self.truth["position_m"][first:end, self.up]
+            depth_m = float(height_m[0] - height_m.min())
+            if depth_m > _FELL_m:
+                begin = first + int(np.argmax(height_m < height_m[0] - _FALLS_m))
+                off_s, end_s = time_s[first], time_s[end - 1]
+                found.append(Fall(float(off_s), float(time_s[begin]), float(end_s), depth_m))
+        return found
+
+    def released(self, fall: Fall) -> bool:
+        """Return whether a platform without power fell because something from outside changed."""
+        times = [(cause.at_s, cause.end_s) for cause in self.causes if cause.name in _FROM_OUTSIDE]
+        times += [(at_s, at_s) for name, at_s in self.played.done if name == "mend"]
+        changes = [(max(a, fall.off_s), b) for a, b in times]
+        return any(a <= fall.began_s <= b + _RELEASED_S for a, b in changes)
 
     @property
     def up(self) -> int:
@@ -128,30 +146,39 @@ class Judge:
         return 1 if self.robot.platform is not None and self.robot.platform.is_planar else 2
 
     @property
-    def pushed(self) -> bool:
-        """Whether something moved the platform from outside."""
-        return any(cause.name in _FROM_OUTSIDE for cause in self.causes)
-
-    @property
     def ended(self) -> bool:
         """Whether the power may be off because of a user, or of a dead or stalled loop."""
         return any(name in ("power off", "stall", "die") for name, _ in self.played.done)
 
-    def fall_m(self) -> float:
-        """Return how far the platform has come down since the last power went off."""
-        off_s = self.off_since()
-        if off_s is None:
-            return 0.0
-        height_m = self.truth["position_m"][self.truth["time_s"] >= off_s, self.up]
-        return float(height_m[0] - height_m.min())
+
+
+@dataclass(frozen=True)
+class Fall:
+    """A descent of the platform while no motor has torque; bus times."""
+
+    off_s: float
+    began_s: float
+    end_s: float
+    """When a motor has torque again, or the scenario ends."""
+    depth_m: float
+
+    def __str__(self) -> str:
+        return f"the platform fell {1e3 * self.depth_m:.0f} mm at {self.began_s:.3f} s"
 
 
 class Cause:
     """An injected fault."""
 
-    def __init__(self, fault: dict[str, Any], began_s: float) -> None:
+    def __init__(
+        self, fault: dict[str, Any], all_faults: Sequence[dict[str, Any]], began_s: float
+    ) -> None:
         self.name, self.axis = str(fault["fault"]), int(fault["axis"] or 0) - 1
         self.at_s = began_s + fault["at_s"]
+        ends_s = [
+            one["at_s"] for one in all_faults if one["fault"] == self.name and one["value"] == 0
+        ]
+        self.end_s = max([self.at_s, *(began_s + end_s for end_s in ends_s)])
+        """End of a push."""
 
     def explains(self, named: dict[str, Any]) -> bool:
         """Return whether a fault that the robot named may follow from this one."""
@@ -233,11 +260,12 @@ def dead_loop_has_no_torque(j: Judge) -> Iterator[str]:
 
 def falls_are_reported(j: Judge) -> Iterator[str]:
     """Whoever restarts a robot must know that its platform has fallen."""
-    if j.played.dead_s is not None or j.played.recovered is not None or not j.end:
-        return
-    fell_m = j.fall_m()
-    if fell_m > _FELL_m and not j.pushed and not (j.end["last_stop"] or {}).get("fallen"):
-        yield f"the platform fell {1e3 * fell_m:.0f} mm, and the status does not say so"
+    for fall in j.falls():
+        if j.played.dead_s is not None or j.released(fall):
+            continue
+        then = [status for status in j.played.statuses if status["at_s"] <= fall.end_s]
+        if not (then and (then[-1]["last_stop"] or {}).get("fallen")):
+            yield f"{fall}, and the status does not say so"
 
 
 def causes_are_true(j: Judge) -> Iterator[str]:
@@ -266,12 +294,17 @@ def causes_are_named(j: Judge) -> Iterator[str]:
 
 def falls_have_a_cause(j: Judge) -> Iterator[str]:
     """The winches lower a platform before its power goes off, unless none of them can."""
-    fell_m, reason = j.fall_m(), str(j.end.get("reason"))
-    lost = {cause.axis for cause in j.causes if cause.name not in _WORDS_ONLY}
-    unavoidable = len(lost) > 1 or any(cause.name == "bus-lost" for cause in j.causes)
-    warned = "it may fall when the power goes off" in reason
-    if fell_m > _FELL_m and not (unavoidable or warned or j.pushed or j.ended):
-        yield f"the platform fell {1e3 * fell_m:.0f} mm without power: {reason}"
+    for fall in j.falls():
+        then = [status for status in j.played.statuses if status["at_s"] <= fall.end_s]
+        reason = str(then[-1]["reason"]) if then else ""
+        cut = [at_s for name, at_s in j.played.done if name in ("power off", "die")]
+        unavoidable = (
+            any(0.0 <= fall.off_s - at_s < _DEAD_WITHIN_S for at_s in cut)
+            or "it may fall when the power goes off" in reason
+            or j.released(fall)
+        )
+        if not unavoidable:
+            yield f"{fall} without power: {reason}"
 
 
 def descents_are_predicted(j: Judge) -> Iterator[str]:
@@ -398,6 +431,6 @@ def _outcome(j: Judge, cause: Cause) -> str:
     if not faults:
         unbooted = any(s["state"] in ("unconfigured", "inactive") and s["reason"] for s in later)
         return "boot failed" if unbooted else "not noticed"
-    ended = "fell" if j.fall_m() > _FELL_m else "stopped"
+    ended = "fell" if j.falls() else "stopped"
     named = any(cause.axis in (fault["axis"], *fault["suspects"]) for fault in faults)
     return f"{ended}, {'named' if named else 'another cause'}"

@@ -297,7 +297,7 @@ class Player:
     def _recover(self) -> None:
         """Repair everything and follow the steps that the status gives."""
         played, rig = self.played, self._rig
-        self._simulator.inject("mend")
+        self._inject("mend")
         if rig.right.token is None:
             self._run(_LEASE_S)  # until the right of the client that has left expires
             rig.right.take("campaign")
@@ -312,13 +312,17 @@ class Player:
                 break
             played.recovery.append(steps)
             if (status["last_stop"] or {}).get("fallen") or (pushed and not status["driving"]):
-                self._simulator.inject("put-back")
+                self._inject("put-back")
                 self._run(0.1)
             for step in re.findall(r"`cdpr (check|ack|enable|tighten --from home|tighten)`", steps):
                 if not all(self._succeeds(command) for command in _COMMANDS[step]):
                     return
         move = {"do": "program", "program": "pose", "wanted": self._lowest_place()}
         played.recovered = self._succeeds(move)
+
+    def _inject(self, fault: str) -> None:
+        self.played.done.append((fault, self._now_s))
+        self._simulator.inject(fault)
 
     def _lowest_place(self) -> dict[str, Any]:
         """Return a target in the middle of the workspace, near its lower end."""
