@@ -139,8 +139,8 @@ class Player:
             if self._scenario.recovers and played.settled_s is not None:
                 self._recover()
         self._look()
+        played.rise_MB = _memory_MB() - memory_MB  # without the copies for the judge
         self._finish()
-        played.rise_MB = _memory_MB() - memory_MB
         return played
 
     def _begin_recording(self) -> None:
@@ -269,7 +269,8 @@ class Player:
         try:
             plan = self._rig.plan(file)
         except Error as error:
-            self.played.replies.append(noted | {"ok": False, "text": str(error)})
+            text = str(error).replace(f"{file.parent}/", "")
+            self.played.replies.append(noted | {"ok": False, "text": text})
             return
         self._program("path", {"plan": plan})
 
@@ -302,6 +303,8 @@ class Player:
             self._run(_LEASE_S)  # until the right of the client that has left expires
             rig.right.take("campaign")
         self._run(0.1)
+        engine = rig.loop.engine
+        self._run_until(lambda: not engine.driving or engine.program.at_rest, _TIGHTEN_S)
         played.recovered = False
         # the hand that has pushed a loose platform from its stand also carries it back
         pushed = any(fault["fault"].startswith("push") for fault in self._scenario.faults)
