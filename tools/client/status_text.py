@@ -274,7 +274,10 @@ def next_steps(status: dict[str, Any]) -> list[str]:
     if state in ("unconfigured", "inactive") and status["reason"]:
         return ["next: remove the cause, then `cdpr check`"]
     progress = status.get("program_progress") or {}
-    loose = last and status["program"] == "hold" and progress.get("tight") is False
+    loose = last and (
+        (status["program"] == "hold" and progress.get("tight") is False)
+        or (status["program"] == "lower" and progress.get("done") == 1.0)
+    )
     if state not in ("fault", "ready") and not (state == "active" and loose):
         return []
     steps = []

@@ -46,6 +46,8 @@ def status_of(**keys: Any) -> dict[str, Any]:
 LOWERED: dict[str, Any] = {"fallen": False, "broken": []}
 FALLEN: dict[str, Any] = {"fallen": True, "broken": ["left: broken"]}
 LOOSE: dict[str, Any] = {"program": "hold", "program_progress": {"tight": False}}
+LOWERING: dict[str, Any] = {"program": "lower", "program_progress": {"done": 0.0}}
+SET_DOWN: dict[str, Any] = {"program": "lower", "program_progress": {"done": 1.0}}
 TIGHT: dict[str, Any] = {"program": "hold", "program_progress": {"tight": True}}
 SIMULATED = {"can0": {"url": "simbus:own-1-can0"}}
 
@@ -132,6 +134,8 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
         ({"state": "ready", "last_stop": LOWERED}, ["`cdpr enable`, `cdpr tighten`"]),
         ({"state": "active", "last_stop": LOWERED, **LOOSE}, ["`cdpr tighten`"]),
         ({"state": "active", "last_stop": LOWERED, **TIGHT}, []),
+        ({"state": "active", "last_stop": LOWERED, **LOWERING}, []),
+        ({"state": "active", "last_stop": LOWERED, **SET_DOWN}, ["`cdpr tighten`"]),
         (
             {"state": "fault", "last_stop": LOWERED | {"broken": ["left: broken"]}},
             ["repair the cable", "`cdpr ack`, `cdpr enable`, `cdpr tighten --from home`"],
