@@ -33,6 +33,9 @@ _USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.3, 6.0, 0.01, 5
 """Share of a push that turns most winches, and factor on the integral rate beyond it. Time for
 which a winch that does not turn is pushed fully, plus cycles until its encoder could show a motion.
 A rotor whose encoder has failed accelerates unseen, so they are short."""
+_NOISY_m_s, _NOISE_S = 1.0, 0.05
+"""Mean deviation of a cable's measured speed from its filtered value, over this time, above which
+an encoder is not used: its noise would be clipped to an average pull, which drags the platform."""
 
 
 @jit
@@ -47,6 +50,7 @@ def control_speed(
     left: FloatArray,
     unseen: FloatArray,
     stuck: BoolArray,
+    noise: FloatArray,
     push: FloatArray,
     position: FloatArray,
     last: FloatArray,
@@ -67,6 +71,9 @@ def control_speed(
         if not fast or jumped[i]:
             speed[i] += weight * (raw - speed[i])
         jumped[i] = fast
+        off = min(abs(cable[i] * (raw - speed[i])), _FASTEST_m_s)
+        if noise[i] <= _NOISY_m_s:
+            noise[i] += period / (period + _NOISE_S) * (off - noise[i])
         out = cable[i] * speed[i]
         rate = integral_rate
         if left[i] > 0.0:
@@ -85,7 +92,7 @@ def control_speed(
                 rate *= _HURRY
         else:
             unseen[i] = 0.0
-        if stuck[i]:
+        if stuck[i] or noise[i] > _NOISY_m_s:
             tension[i] = torque[i] = integral[i] = left[i] = 0.0
             continue
         error = paying_out[i] / cable[i] - speed[i]
@@ -103,7 +110,8 @@ class WinchSpeedLoop:
     cable is paid out at the commanded speed, held with at most `high_N`. While `left_m` of a cable
     is above 0, its motor also pays out without a load, against friction of up to `push_N`. A winch
     that is pushed outwards as hard as it may be and does not turn is `stuck`. It gets no torque
-    from then on: its encoder may have failed, and its motor would run away.
+    from then on: its encoder may have failed, and its motor would run away. A winch whose encoder
+    shows mostly noise gets none either.
     Anti-windup by back-calculation.
     """
 
@@ -138,6 +146,7 @@ class WinchSpeedLoop:
         self.stuck = np.zeros(n, np.bool_)
         """Whether each winch was pushed outwards fully and has not turned."""
         self._unseen_s = np.zeros(n)
+        self._noise_m_s = np.zeros(n)
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
         self._kernel = bound_to(self._bind)
@@ -145,9 +154,15 @@ class WinchSpeedLoop:
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
         self._last[:], self._jumped[:] = feedback.position_rad, False
-        self._unseen_s[:], self.stuck[:] = 0.0, False
+        self._unseen_s[:] = self._noise_m_s[:] = 0.0
+        self.stuck[:] = False
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
+
+    @property
+    def noisy(self) -> BoolArray:
+        """Whether the encoder of each winch has shown mostly noise since `begin`, (n,)."""
+        return self._noise_m_s > _NOISY_m_s
 
     def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Write the torques of this cycle."""
@@ -160,6 +175,6 @@ class WinchSpeedLoop:
         return bound(
             control_speed, self._period_s, self._weight, self.low_N, self.high_N,
             self.paying_out_m_s, self._cable, self._gain, self.left_m, self._unseen_s, self.stuck,
-            self.push_N, feedback.position_rad, self._last, self._jumped, self.speed_rad_s,
-            self._integral, self.tension_N, torque_Nm, then=(0.0, 0.0),
+            self._noise_m_s, self.push_N, feedback.position_rad, self._last, self._jumped,
+            self.speed_rad_s, self._integral, self.tension_N, torque_Nm, then=(0.0, 0.0),
         )  # fmt: skip

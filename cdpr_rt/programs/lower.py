@@ -251,8 +251,8 @@ class LowerProgram(PlatformProgram):
         bottom_N = np.where(winches.left_m > 0.0, -winches.push_N, low_N)
         unloaded = winches.tension_N <= bottom_N + _LIGHT * np.abs(bottom_N)
         light = not low_N.any() or bool((unloaded | running_in).all())
-        paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
-        if not light or paid_out_m > _STILL_m:
+        paid_out_m = self._cable * (feedback.position_rad - self._here)
+        if not light or (paid_out_m[~winches.noisy] > _STILL_m).any():
             self._here[:] = feedback.position_rad
             self._still = 0
         self._still += 1

@@ -73,3 +73,21 @@ def test_a_motor_whose_encoder_shows_no_motion_does_not_run_away() -> None:
     assert fastest_rad_s < 200.0
     assert loop.stuck.all()
     assert speed_rad_s == torque_Nm[0] == 0.0
+
+
+@pytest.mark.parametrize("noise_counts", [0.3, 145.0])
+def test_a_winch_whose_encoder_shows_noise_does_not_wind_in_its_cable(noise_counts: float) -> None:
+    """A tight cable is held at its end; clipped noise would pull with half the highest tension."""
+    noise_rad = noise_counts * 2.0 * np.pi / 8192
+    loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
+    loop.low_N[:], loop.high_N[:], loop.paying_out_m_s[:] = LOW_N, HIGH_N, 0.15
+    loop.fastest_in_m_s, loop.integral_rate_1_s = FASTEST_IN_m_s, HANGING_LOAD_1_s
+    feedback, torque_Nm = AxisFeedback(1), np.array([-18.0 * CABLE_m])
+    loop.begin(feedback, np.zeros(1), torque_Nm)
+    random, tensions_N = np.random.default_rng(1), []
+    for _ in range(1000):
+        feedback.position_rad[:] = np.round(random.normal(0.0, noise_rad, 1), 4)
+        loop.update(feedback, torque_Nm)
+        tensions_N.append(loop.tension_N[0])
+    assert loop.noisy[0] == (noise_counts > 100.0)
+    assert np.mean(tensions_N[200:]) == 0.0 if loop.noisy[0] else min(tensions_N) >= LOW_N
