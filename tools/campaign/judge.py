@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_rt.arrays import FloatArray
-from cdpr_rt.diagnosis.predictions import Loss, corner_swings, slips
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.diagnosis.predictions import Loss, Swing, corner_swings, slips
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_tools.campaign.play import Played
@@ -55,24 +55,33 @@ class Predicted:
 
     fastest_m_s: list[float]
     """Downward speed after the loss of each cable or drive, or of the lengths."""
+    aside_m: list[float]
+    """Horizontal way after the same losses."""
     peak_N: FloatArray
     """Tension of each cable after a slip, or at the full torque of its motor."""
+    off_m: FloatArray
+    """Error of the platform's position by an unnoticed slip of each cable."""
+    unnoticed_m: FloatArray
+    """The largest slip of each cable that is not noticed."""
 
 
 @lru_cache(maxsize=1)
 def predicted(robot: str) -> Predicted:
     """Return what is predicted for a robot, by its name or file."""
     s = Subject(load_robot(robot))
-    own_m_s = s.platform.speed_m_s
-    lost = {
-        loss: [max((swing.fastest_m_s for swing in swings), default=math.inf) for swings in found]
-        for loss, found in ((loss, corner_swings(s, loss)) for loss in Loss)
-    }
-    fastest_m_s = [
-        _OVER * max(cable, drive, *lost[Loss.LENGTHS]) + own_m_s
-        for cable, drive in zip(lost[Loss.CABLE], lost[Loss.DRIVE], strict=True)
-    ]
-    return Predicted(fastest_m_s, _OVER * np.array([slip.peak_N for slip in slips(s)]))
+    swings = {loss: corner_swings(s, loss) for loss in Loss}
+
+    def worst(i: int, figure: Callable[[Swing], float]) -> float:
+        found = [*swings[Loss.CABLE][i], *swings[Loss.DRIVE][i], *swings[Loss.LENGTHS][0]]
+        return _OVER * max(map(figure, found), default=math.inf) + s.platform.speed_m_s
+
+    slipped = slips(s)
+    return Predicted(
+        [worst(i, lambda swing: swing.fastest_m_s) for i in range(s.n)],
+        [worst(i, lambda swing: swing.aside_m) for i in range(s.n)],
+        *(_OVER * np.array([getattr(slip, name) for slip in slipped])
+          for name in ("peak_N", "off_m", "unnoticed_m")),
+    )  # fmt: skip
 
 
 class Judge:
@@ -111,10 +120,34 @@ class Judge:
         for status, end_s in zip(played.statuses, ends_s, strict=True):
             yield status, end_s if played.dead_s is None else min(end_s, played.dead_s)
 
+    def during(self, of: Callable[[dict[str, Any]], bool]) -> BoolArray:
+        """Return for each record of the truth whether the status then fulfilled `of`."""
+        chosen, time_s = np.zeros(self.truth.size, np.bool_), self.truth["time_s"]
+        for status, end_s in self.periods():
+            if status["state"] == "active" and of(status):
+                chosen |= (time_s >= status["at_s"]) & (time_s < end_s)
+        for name, at_s in self.played.done:  # the loop of the robot did not run
+            if name in ("stall", "die"):
+                chosen &= (time_s < at_s) | (time_s > at_s + _STALL_S)
+        return chosen
+
     def works_at(self, at_s: float) -> bool:
         """Return whether the robot had power and no fault at a time."""
         then = [status for status in self.played.statuses if status["at_s"] <= at_s]
         return bool(then) and then[-1]["state"] == "active" and then[-1]["reacting"] == "none"
+
+    def sure(self, cause: Cause) -> bool:
+        """Return whether no running robot may miss a fault."""
+        then = self.truth[: np.searchsorted(self.truth["time_s"], cause.at_s) + 1][-1]
+        tight = bool((then["tension_N"] > 2.0 * np.asarray(self.limits.tension_min_N)).all())
+        if cause.name == "slip":
+            slip_m = 1e-3 * float(cause.value or 0.0)
+            return tight and slip_m > predicted(self.played.scenario.robot).unnoticed_m[cause.axis]
+        if cause.name == "encoder-jump":
+            winch = self.robot.axes[cause.axis].winch
+            turned = abs(float(cause.value or 0.0)) / winch.encoder_counts_per_turn
+            return bool(turned * math.tau > _SURE_JUMP_rad)
+        return cause.name in _SURE or (cause.name == "cut-cable" and tight)
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""
@@ -151,7 +184,6 @@ class Judge:
         return any(name in ("power off", "stall", "die") for name, _ in self.played.done)
 
 
-
 @dataclass(frozen=True)
 class Fall:
     """A descent of the platform while no motor has torque; bus times."""
@@ -173,7 +205,7 @@ class Cause:
         self, fault: dict[str, Any], all_faults: Sequence[dict[str, Any]], began_s: float
     ) -> None:
         self.name, self.axis = str(fault["fault"]), int(fault["axis"] or 0) - 1
-        self.at_s = began_s + fault["at_s"]
+        self.at_s, self.value = began_s + fault["at_s"], fault["value"]
         ends_s = [
             one["at_s"] for one in all_faults if one["fault"] == self.name and one["value"] == 0
         ]
@@ -221,6 +253,8 @@ _SURE: Final = (
     "bus-off", "bus-lost", "emcy-flood",
 )  # fmt: skip
 """Faults that no running robot may miss."""
+_SURE_JUMP_rad: Final = 1.0
+"""The same for jumps of an encoder: more than a motor turns in some cycles."""
 
 
 # The invariants. Each yields what was violated.
@@ -286,7 +320,7 @@ def causes_are_named(j: Judge) -> Iterator[str]:
         return
     named = [fault for fault, _, _ in j.named()]
     for cause in j.causes:
-        if cause.name not in _SURE or not j.works_at(cause.at_s):
+        if not j.works_at(cause.at_s) or not j.sure(cause):
             continue
         if not any(fault["axis"] == cause.axis or cause.explains(fault) for fault in named):
             yield f"{cause.name} of axis {cause.axis + 1} is not named"
@@ -308,13 +342,46 @@ def falls_have_a_cause(j: Judge) -> Iterator[str]:
 
 
 def descents_are_predicted(j: Judge) -> Iterator[str]:
-    """Whoever stands below must know how fast a platform may come down."""
+    """Whoever stands below or beside must know how a platform may come down."""
     if len(j.causes) != 1 or j.ended or j.causes[0].name in _ANYWHERE:
         return
     cause, fastest_m_s = j.causes[0], -float(j.truth["velocity_m_s"][:, j.up].min())
     allowed_m_s = predicted(j.played.scenario.robot).fastest_m_s[cause.axis]
     if fastest_m_s > allowed_m_s:
         yield f"the platform came down at {fastest_m_s:.2f} m/s, {allowed_m_s:.2f} m/s predicted"
+    lowered = j.during(lambda s: s["program"] == "lower" and bool(s["last_stop"]["fallen"]))
+    level_m = np.delete(j.truth["position_m"][lowered], j.up, axis=1)
+    aside_m = float(np.linalg.norm(level_m - level_m[:1], axis=1).max(initial=0.0))
+    if aside_m > predicted(j.played.scenario.robot).aside_m[cause.axis]:
+        yield f"the platform went {aside_m:.2f} m aside while it was lowered"
+
+
+def what_matters_is_noticed(j: Judge) -> Iterator[str]:
+    """A robot that reports no fault is within its limits, and where it says."""
+    calm = j.during(lambda s: s["reacting"] == "none" and not s["faults"])
+    figures = {"tension_N": j.limits.tension_max_N, "motor_rad_s": j.limits.speed_rad_s}
+    for name, limit in figures.items():
+        over = (np.abs(j.truth[name]) > _OVER * np.broadcast_to(limit, (j.n,))) & calm[:, None]
+        for axis in range(j.n):
+            if _longest(over[:, axis]) > _NOTICED_CYCLES:
+                yield f"axis {axis + 1}: {name} up to {np.abs(j.truth[name]).max():.0f} unnoticed"
+    rows, moves = j.played.rows, j.during(lambda s: s["program"] in ("pose", "path"))
+    if rows.size == j.truth.size:
+        off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"], axis=1)
+        allowed_m = _OFF_m + float(predicted(j.played.scenario.robot).off_m.max())
+        if _longest((off_m > allowed_m) & calm & moves) > _NOTICED_CYCLES:
+            yield f"the platform is up to {np.nanmax(off_m[calm & moves]):.3f} m from where it says"
+
+
+_NOTICED_CYCLES: Final = 250
+_OFF_m: Final = 0.03
+_STALL_S: Final = 1.1
+
+
+def _longest(chosen: BoolArray) -> int:
+    """Return the largest number of successive true values."""
+    edges = np.flatnonzero(np.diff(np.r_[False, chosen, False]))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def limits_are_kept(j: Judge) -> Iterator[str]:
@@ -402,9 +469,9 @@ def memory_is_bounded(j: Judge) -> Iterator[str]:
 
 INVARIANTS: Final[tuple[Invariant, ...]] = (
     no_torque_afterwards, dead_loop_has_no_torque, falls_are_reported, falls_have_a_cause,
-    descents_are_predicted, causes_are_true, causes_are_named, limits_are_kept,
-    tensions_are_predicted, commands_are_answered, comes_to_rest, works_again, no_exception,
-    numbers_are_finite, recordings_are_complete, memory_is_bounded,
+    descents_are_predicted, causes_are_true, causes_are_named, what_matters_is_noticed,
+    limits_are_kept, tensions_are_predicted, commands_are_answered, comes_to_rest, works_again,
+    no_exception, numbers_are_finite, recordings_are_complete, memory_is_bounded,
 )  # fmt: skip
 
 
