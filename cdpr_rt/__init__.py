@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cdpr_rt.model.own_distribution import TensionDistribution
     from cdpr_rt.offline import Model, load
-    from cdpr_rt.platform.own_controller import Controller, State, Target
+    from cdpr_rt.platform.own_controller import Controller, State, Target, TorqueController
     from cdpr_rt.programs.own_program import Program
     from cdpr_rt.robot import (
         AlreadyRunning,
@@ -54,6 +54,7 @@ __all__ = [
     "State",
     "Target",
     "TensionDistribution",
+    "TorqueController",
     "calibrate",
     "commission",
     "connect",
@@ -75,6 +76,7 @@ _HOMES = {
     "State": "cdpr_rt.platform.own_controller",
     "Target": "cdpr_rt.platform.own_controller",
     "TensionDistribution": "cdpr_rt.model.own_distribution",
+    "TorqueController": "cdpr_rt.platform.own_controller",
 }
 """Modules of these names; all others are in `cdpr_rt.robot`."""
 

@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 WordArray = NDArray[np.uint16]
+
+
+def real_array(given: ArrayLike) -> FloatArray:
+    """Convert real numbers to an array; raises TypeError or ValueError for anything else."""
+    array = np.asarray(given)
+    if array.dtype.kind not in "biuf":
+        raise TypeError(f"values of type {array.dtype}; want real numbers")
+    return array.astype(float, copy=False)
 
 
 def rms(values: FloatArray) -> float:

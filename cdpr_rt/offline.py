@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
-from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, real_array
 from cdpr_rt.code_loader import CodeError
 from cdpr_rt.errors import ControlError
 from cdpr_rt.model.hanging import HangingSearch, upward
@@ -83,6 +83,9 @@ class Model:
         self._own_distribution = cache(own_distribution)
         self.cables = cables
         """Names of the n cables."""
+
+    def __repr__(self) -> str:
+        return f"<Model of {self.n} cables, {self.d} controlled directions>"
 
     @property
     def n(self) -> int:
@@ -286,13 +289,9 @@ class Model:
 
     def _wrenches(self, wrench: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
         given = np.zeros(self.d) if wrench is None else _numbers("wrench", wrench)
-        try:
-            wide = np.broadcast_to(given, (*shape, self.d))
-        except ValueError:
-            wide = np.array(np.nan)
-        if not np.isfinite(wide).all():
+        if given.shape not in ((self.d,), (*shape, self.d)) or not np.isfinite(given).all():
             raise _unfit("wrench", given, f"({self.d},) or {(*shape, self.d)}")
-        return wide.reshape(-1, self.d)
+        return np.broadcast_to(given, (*shape, self.d)).reshape(-1, self.d)
 
     def _one(self, position: ArrayLike) -> FloatArray:
         rows, shape = self._rows(position)
@@ -320,6 +319,6 @@ def _unfit(name: str, values: FloatArray, wanted: str) -> InvalidArgument:
 def _numbers(name: str, given: ArrayLike) -> FloatArray:
     """Convert the argument `name` to an array; raises InvalidArgument."""
     try:
-        return np.asarray(given, float)
+        return real_array(given)
     except (TypeError, ValueError):
         raise InvalidArgument(f"{name}: {given!r}; want an array of numbers") from None

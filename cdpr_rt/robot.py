@@ -15,7 +15,7 @@ from typing import Any, Final, Protocol, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, real_array
 from cdpr_rt.core.cycle_row import FIELDS, Row, column_names
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 
@@ -351,7 +351,7 @@ class Robot:
     def enable(self, program: str = "hold") -> None:
         """Switch on the drives and run a program. No change if the drives already have power."""
         if self.state != "active":
-            self._backend.command("enable", program)
+            self._backend.command("enable", _plain("program", program))
 
     def disable(self) -> None:
         """Stop the motion under control, then remove the power. No change after a fault."""
@@ -557,7 +557,7 @@ class Robot:
 
         The reference page "Programs" lists the programs and their arguments.
         """
-        self._carry_out(program, arguments)
+        self._carry_out(_plain("program", program), arguments)
 
     def hold(self) -> None:
         """Stop any motion and hold the position with power; `resume` continues it."""
@@ -616,7 +616,7 @@ class Robot:
         if not isinstance(axis, int | np.integer) or not 0 <= axis < len(self.axes):
             names = ", ".join(map(repr, self.axes))
             raise InvalidArgument(f"axis: {axis!r}; allowed: 0 to {len(self.axes) - 1}, or {names}")
-        self._backend.inject_fault(int(axis), fault, value)
+        self._backend.inject_fault(int(axis), _plain("fault", fault), _plain("value", value))
 
     # -- helpers
 
@@ -710,7 +710,7 @@ class Robot:
     ) -> list[float | None]:
         """Return numbers as a list, with None for nan if `optional`; raises InvalidArgument."""
         try:
-            numbers = np.asarray(value, float)
+            numbers = real_array(value)
         except (TypeError, ValueError):
             raise InvalidArgument(
                 f"{name}: {value!r}; allowed: {size} numbers, one for each {each}"
@@ -786,6 +786,22 @@ def path_of(name: str, value: str | Path) -> Path:
         raise InvalidArgument(f"{name}: {value!r}; allowed: a path") from None
 
 
+def texts_of(name: str, value: str | Sequence[str]) -> list[str]:
+    """Return the texts that a user gives, one or several; raises InvalidArgument."""
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
+        raise InvalidArgument(f"{name}: {value!r}; allowed: a text, or a list of texts")
+    return list(texts)
+
+
+def number_in(name: str, value: float, low: float, high: float, unit: str = "") -> float:
+    """Return a user's number if it is within bounds; raises InvalidArgument."""
+    number = _finite(value)
+    if not low <= number <= high:
+        raise InvalidArgument(f"{name}: {value!r}; allowed: {low:g} to {high:g}{unit}")
+    return number
+
+
 def _positive(name: str, value: float) -> float:
     number = _finite(value)
     if not number > 0.0:
@@ -810,7 +826,7 @@ def _finite(value: float) -> float:
 
 
 def _plain(name: str, value: Any) -> Any:
-    """Return an argument of a program as JSON has it; raises InvalidArgument."""
+    """Return an argument of a command as JSON has it; raises InvalidArgument."""
     try:
         return json.loads(json.dumps(value, allow_nan=False, default=lambda array: array.tolist()))
     except (AttributeError, RecursionError, TypeError, ValueError):

@@ -25,7 +25,7 @@ CORNER_M, M_PER_UNIT = np.array([-0.15, 2.2]), 0.003  # where (0, 0) of the SVG 
 
 def points_m(svg: Path) -> np.ndarray:
     """Return the points (k, 2) of an SVG file in the room, with curves as short lines."""
-    points, kinds, begin = [], [], ()
+    points, kinds, begin = list[np.ndarray](), list[np.uint8](), np.zeros((1, 2))
     for shape in ElementTree.parse(svg).iter():
         commands = shape.get("d") or f"M {shape.get('points', '')}"
         for letter, numbers in re.findall(r"([MLCZ])([^MLCZ]*)", commands):
@@ -33,8 +33,8 @@ def points_m(svg: Path) -> np.ndarray:
             begin = added[:1] if letter == "M" else begin
             points += [*(begin if letter == "Z" else added)]
             kinds += [Lines.CURVE4 if letter == "C" else Lines.LINETO] * (len(points) - len(kinds))
-    lines = Lines(points, [Lines.MOVETO, *kinds[1:]]).cleaned(curves=False)
-    return CORNER_M + M_PER_UNIT * lines.vertices[lines.codes != Lines.STOP] * [1.0, -1.0]
+    [lines] = Lines(points, [Lines.MOVETO, *kinds[1:]]).to_polygons(closed_only=False)
+    return np.array(CORNER_M + M_PER_UNIT * np.array(lines, float) * [1.0, -1.0])
 
 
 def main(picture: str) -> None:

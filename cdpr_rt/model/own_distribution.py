@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import DISTRIBUTIONS
-from cdpr_rt.arrays import FloatArray, read_only
+from cdpr_rt.arrays import FloatArray, read_only, real_array
 from cdpr_rt.code_loader import CodeError, load_allowed, load_registered_one, require_allowed
 from cdpr_rt.errors import ControlError
 from cdpr_rt.jit import jit
@@ -113,7 +113,7 @@ class OwnDistribution:
         """
         given = read_only(W), read_only(w_e), self._low_N, self._high_N, read_only(previous_N)
         try:
-            t = np.ascontiguousarray(self._function(*given), float)
+            t = np.ascontiguousarray(real_array(self._function(*given)))
         except (Exception, SystemExit) as error:  # the latter must not end the loop's process
             raise self._error(f"{type(error).__name__}: {error}") from error
         if t.shape != self._low_N.shape:

@@ -341,7 +341,7 @@ class CableControl(PlaceChecks):
         self._pose.array[:] = self._home.array
         self._wanted = Pose(np.zeros(3))
         self._scratch, (found, wanted) = np.zeros((4, 3)), np.zeros((2, CABLE_ROWS, n))
-        self._found, self._rise_N = found, np.zeros(n)
+        self._found, self._wanted_at = found, wanted
         follows = self.gains.follows_pose
         self._planned_at = (found, self._pose.array) if follows else (wanted, self._wanted.array)
         filters = tracking_filters(self.gains, self._period_s)
@@ -383,7 +383,7 @@ class CableControl(PlaceChecks):
         n, d = model.kinematics.n, model.size
         self._state = np.zeros(3 * d + 1)
         self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
-        self._rise_N = np.zeros(n)
+        self._rise_N, self._length_m, self._rate_m_s, self._rotors_Nm = np.zeros((4, n))
         scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
             loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
@@ -462,23 +462,40 @@ class CableControl(PlaceChecks):
             planned if method == "minimum-deviation" else None,
         )  # fmt: skip
         wrench, tension_N, self._velocity = np.zeros(d), np.zeros(n), np.zeros(d)
+        motors, m_per_rad = self._motors, self._motors[tracking.M_PER_RAD]
 
         def distribute(force: FloatArray) -> FloatArray:
-            np.subtract(self._wrench, force, out=wrench)
+            given = np.asarray(force)
+            if given.shape != (d,) or given.dtype.kind not in "iuf" or not np.isfinite(given.sum()):
+                raise ValueError(f"distribute: force {given}; give {d} finite numbers, N and Nm")
+            np.subtract(self._wrench, given, out=wrench)
             carried = solver.solve(self._W, wrench, tension_N) <= TensionOutcome.SUBSTITUTED
             if self._own_distribution is not None and carried:
                 self._own_distribution.solve(self._W, wrench, last_N, tension_N)
             return tension_N.copy()  # two calls in a cycle may be compared
 
+        def torques(tension_N: FloatArray) -> FloatArray:
+            return np.asarray(self._rotors_Nm - m_per_rad * (tension_N + self._rise_N))
+
+        def tensions_of(torque_Nm: FloatArray) -> FloatArray:
+            return np.asarray((self._rotors_Nm - torque_Nm) / m_per_rad - self._rise_N)
+
         last_N = np.array(self.tension_N)
         state = State(
             read_only(self.estimated), read_only(self._velocity), read_only(self._W),
-            read_only(self._wrench), read_only(self._motors[tracking.LENGTH]), read_only(last_N),
-            read_only(model.low_N), read_only(model.high_N), self._period_s, distribute,
+            read_only(self._wrench), read_only(motors[tracking.LENGTH]),
+            read_only(motors[tracking.RATE]), read_only(last_N), read_only(model.low_N),
+            read_only(model.high_N), self._period_s, distribute, torques,
         )  # fmt: skip
-        position, velocity, acceleration = map(read_only, self.setpoint.shaped)
-        target = Target(position, velocity, acceleration)
-        self._own = OwnController(controller, state, target, last_N)
+        target = Target(*map(read_only, (*self.setpoint.shaped, self._length_m, self._rate_m_s)))
+        self._own = OwnController(controller, state, target, last_N, tensions_of)
+
+    def _show_cables(self, setpoint: Setpoint) -> None:
+        """Write what a user's controller reads about the cables' set-points."""
+        np.add(self._wanted_at[FREE], self._wanted_at[ARC], out=self._length_m)
+        m_per_rad, inertia = self._motors[tracking.M_PER_RAD], self._motors[tracking.INERTIA]
+        np.multiply(m_per_rad, setpoint.velocity_rad_s, out=self._rate_m_s)
+        np.multiply(inertia, setpoint.acceleration_rad_s2, out=self._rotors_Nm)
 
     def stand_in(self) -> None:
         """Control the platform without the user's code until the next `begin`."""
@@ -579,8 +596,10 @@ class CableControl(PlaceChecks):
             self._own.restart(self.tension_N)
         elif self._own is not None:
             self._moves[loop.TWIST].take(self._directions, out=self._velocity, mode="clip")
-            self._own.write(self.tension_N)
-            self._feedforward_N[:] = self.tension_N
+            self._show_cables(setpoint)
+            if self._own.write(self.tension_N):
+                self._feedforward_N[:] = self.tension_N
+                null_directions *= not self._own.returns_torques
         self._limited = self._drive(null_directions, slope, torque_Nm)
         self._oscillation.update(setpoint.position_rad)
 

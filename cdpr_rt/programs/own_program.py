@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, real_array
 from cdpr_rt.code_loader import CodeError
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.motion.trajectory import stopping_position
@@ -195,7 +195,7 @@ class OwnProgram(PoseProgram):
         """Return a target as a position (d,); if it has no rotation, it gets that of `before`."""
         if target is None:
             return None
-        given = np.asarray(target, float)
+        given = real_array(target)
         if given.shape not in ((self._k,), before.shape) or not np.isfinite(given.sum()):
             wanted = f"({self._k},)" + f" or {before.shape}" * (before.size > self._k)
             shown = np.array2string(given, threshold=10)

@@ -68,6 +68,7 @@ def test_a_position_is_feasible_if_linear_programming_finds_tensions(name: str) 
 
 def test_invalid_input_is_reported_with_what_is_allowed() -> None:
     model = cdpr.load("spatial-8")
+    assert repr(model) == "<Model of 8 cables, 6 controlled directions>"
     with pytest.raises(
         cdpr.InvalidArgument, match=r"position: .*finite numbers of shape \(..., 3\) or"
     ):
@@ -80,6 +81,10 @@ def test_invalid_input_is_reported_with_what_is_allowed() -> None:
         model.is_feasible([0.0, 0.0, 1.0], np.nan)
     with pytest.raises(cdpr.InvalidArgument, match=r"wrench: shape \(2,\)"):
         model.tensions([0.0, 0.0, 1.0], [1.0, 2.0])
+    with pytest.raises(cdpr.InvalidArgument, match=r"wrench: shape \(\)"):
+        model.tensions([0.0, 0.0, 1.0], 5.0)
+    with pytest.raises(cdpr.InvalidArgument, match=r"position: .*want an array of numbers"):
+        model.lengths(np.array([0.0, 0.0, 1j]))
     with pytest.raises(cdpr.InvalidArgument, match=r"lengths_m: shape \(3,\)"):
         model.position([1.0, 2.0, 3.0])
     with pytest.raises(cdpr.InvalidRobot, match="nothing-9"):

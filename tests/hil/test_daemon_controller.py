@@ -30,7 +30,11 @@ class Mine(cdpr.Controller):
         force = 3000.0 * (error + 3.0 * self.integral)
         return state.distribute(force + 250.0 * (target.velocity - state.velocity))
 
-class Blocking(Mine):
+class Torques(Mine, cdpr.TorqueController):
+    def update(self, state, target):
+        return state.torques(super().update(state, target))
+
+class Blocking(Torques):
     def update(self, state, target):
         if target.position[1] > 1.5:
             time.sleep(0.05)
@@ -88,8 +92,9 @@ def done(daemon: RealDaemon, *command: str) -> dict[str, object]:
     return told
 
 
-def test_code_from_files_moves_the_platform_and_is_shown(tmp_path: Path) -> None:
-    with running(tmp_path, "Mine") as daemon:
+@pytest.mark.parametrize("controller", ["Mine", "Torques"])
+def test_code_from_files_moves_the_platform_and_is_shown(tmp_path: Path, controller: str) -> None:
+    with running(tmp_path, controller) as daemon:
         done(daemon, "enable")
         done(daemon, "tighten")
         moved = done(daemon, "move", "--to", "100", "1600")
@@ -101,7 +106,7 @@ def test_code_from_files_moves_the_platform_and_is_shown(tmp_path: Path) -> None
         assert "side" in name["examples"]
         assert "A step to the side. (step_m from 0 to 0.2, 0.1 by default)" in name["description"]
         notices = daemon.status()["notices"]
-        assert any("mine.py:Mine controls the platform" in notice for notice in notices)
+        assert any(f"mine.py:{controller} controls the platform" in notice for notice in notices)
         assert "mine.py:middle distributes the tensions off the stand" in notices
 
 

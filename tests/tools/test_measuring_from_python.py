@@ -28,6 +28,11 @@ from tests.slower_robot import slower_robot
         ({"bandwidth_Hz": 0.5}, cdpr.InvalidArgument, "bandwidth_Hz: 0.5; allowed: 1 to 100"),
         ({"index": "switch"}, cdpr.InvalidArgument, "index: 'switch'; allowed: 'homing', 'probe'"),
         ({"plant": "none.toml"}, cdpr.InvalidArgument, r"none\.toml"),
+        ({"bus": 5}, cdpr.InvalidArgument, "bus: 5; allowed: a text"),
+        ({"bandwidth_Hz": "fast"}, cdpr.InvalidArgument, "bandwidth_Hz: 'fast'; allowed: 1 to"),
+        ({"plant": 5}, cdpr.InvalidArgument, "plant: 5; allowed: a path"),
+        ({"folder": [5]}, cdpr.InvalidArgument, r"folder: \[5\]; allowed: a path"),
+        ({"safety_io": 5}, cdpr.InvalidArgument, "safety_io: 5; allowed: a text"),
     ],
 )
 def test_wrong_arguments_of_commission_start_no_motor(
@@ -53,6 +58,11 @@ def test_commission_in_another_thread_is_rejected_because_ctrl_c_must_stop_it(
         done = threads.submit(cdpr.commission, "winch-mpp0923d", bus="simbus:", folder=tmp_path)
         with pytest.raises(cdpr.Error, match="call it from the main thread"):
             done.result()
+
+
+def test_calibrate_rejects_what_is_no_robot_handle() -> None:
+    with pytest.raises(cdpr.InvalidArgument, match="robot: 'planar-4'; give what simulate, conn"):
+        cdpr.calibrate("planar-4")  # type: ignore[arg-type]
 
 
 @pytest.mark.long
@@ -95,9 +105,18 @@ def test_poses_of_a_failed_calibration_are_kept_and_continued_only_on_request(
         robot.tighten()
         statuses = list[object]()
         robot.on_status = statuses.append
-        for wrong in ({"measured_std_m": 0.0}, {"known_exit_m": 1.0}, {"poses": 3}):
+        wrong: dict[str, Any]
+        for wrong in (
+            {"measured_std_m": 0.0},
+            {"measured_std_m": "2 mm"},
+            {"known_exit_m": 1.0},
+            {"poses": 3},
+            {"identify": 5},
+            {"measured": 5},
+            {"folder": 5},
+        ):
             with pytest.raises(cdpr.InvalidArgument, match=rf"^{next(iter(wrong))}"):
-                cdpr.calibrate(robot, folder=folder, **wrong)
+                cdpr.calibrate(robot, **{"folder": folder, **wrong})
         with pytest.raises(cdpr.InvalidArgument, match=r"measured: returned .*; allowed: 2 numb"):
             cdpr.calibrate(robot, measured=measured, poses=15, folder=folder)
         assert seen[0] == pytest.approx(robot.position_m, abs=1e-3)

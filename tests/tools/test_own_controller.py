@@ -36,8 +36,22 @@ class PoseController(cdpr.Controller):
         return tensions
 
 
-def test_a_numpy_controller_moves_the_platform(planar_file: Path) -> None:
-    mine = PoseController()
+class TorquePoseController(PoseController, cdpr.TorqueController):
+    """The same as motor torques, each 20 mNm too small, as if it knew no friction."""
+
+    def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+        returned = super().update(state, target)
+        if self.failing is not None and self.cycles >= self.fails_at:
+            return returned
+        self.torque_Nm = state.torques(returned) - 0.02
+        return self.torque_Nm.copy()
+
+
+@pytest.mark.parametrize("kind", [PoseController, TorquePoseController])
+def test_a_numpy_controller_moves_the_platform(
+    planar_file: Path, kind: type[PoseController]
+) -> None:
+    mine = kind()
     with cdpr.simulate(planar_file, controller=mine) as robot:
         robot.enable()
         assert mine.cycles == 0
@@ -48,6 +62,50 @@ def test_a_numpy_controller_moves_the_platform(planar_file: Path) -> None:
         assert robot.position_m == pytest.approx([0.2, 1.8], abs=0.004)
         pose = robot.status["program"] == "pose"
         assert pose and mine.cycles > 250
+
+
+def test_torques_are_commanded_as_returned_with_the_compensation_added(
+    planar_file: Path,
+) -> None:
+    mine = TorquePoseController()
+    with cdpr.simulate(planar_file, controller=mine) as robot:
+        robot.enable()
+        robot.tighten()
+        robot.move_to([0.2, 1.6])
+        robot.move_to([-0.2, 1.8], wait=False)
+        for _ in range(5):
+            robot.wait(0.2)
+            row = robot.log("effort_Nm", "compensation_Nm", "torque_asked_Nm")[-1]
+            assert row["effort_Nm"] == pytest.approx(mine.torque_Nm, abs=1e-9)
+            sent_Nm = row["effort_Nm"] + row["compensation_Nm"]
+            assert row["torque_asked_Nm"] == pytest.approx(sent_Nm, abs=1e-9)
+            assert np.abs(row["compensation_Nm"]).max() > 0.01
+
+
+def test_a_controller_in_cable_space_sees_lengths_that_agree_with_the_model(
+    planar_file: Path,
+) -> None:
+    seen: list[float] = []
+    model = cdpr.load(planar_file)
+
+    class InCables(TorquePoseController):
+        def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+            if self.cycles % 20 == 19:
+                J = model.jacobian(target.position)
+                seen.extend(target.cable_length_m - model.lengths(target.position))
+                seen.extend(target.cable_velocity_m_s - J @ target.velocity)
+                seen.extend(state.cable_length_m - model.lengths(state.position))
+                # rates that agree with no motion of the platform stretch the cables
+                J = model.jacobian(state.position)
+                seen.extend(J.T @ (state.cable_velocity_m_s - J @ state.velocity))
+            return super().update(state, target)
+
+    with cdpr.simulate(planar_file, controller=InCables()) as robot:
+        robot.enable()
+        robot.tighten()
+        robot.move_to([0.2, 1.8])
+    assert len(seen) > 100
+    assert np.abs(seen).max() < 0.003  # m and m/s; the platform moves at 0.5 m/s
 
 
 def infinite(tensions: np.ndarray) -> object:
@@ -66,12 +124,27 @@ def division(_tensions: np.ndarray) -> object:
     raise ZeroDivisionError("no way on")
 
 
-def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) -> None:
-    mine = PoseController()
+def imaginary(tensions: np.ndarray) -> object:
+    return tensions * 1j
+
+
+@pytest.mark.parametrize(
+    ("kind", "wanted"),
+    [(PoseController, "tensions in N"), (TorquePoseController, "motor torques in Nm")],
+)
+def test_a_failing_controller_stops_the_robot_like_any_fault(
+    planar_file: Path, kind: type[PoseController], wanted: str
+) -> None:
+    mine = kind()
     with cdpr.simulate(planar_file, controller=mine) as robot:
         for failing, reason in (
-            (infinite, r"PoseController.update returned \[nan nan nan\]; return 3 finite tensions"),
-            (too_few, "return 3 finite tensions in N"),
+            (
+                infinite,
+                rf"PoseController.update returned \[nan nan nan\]; return 3 finite {wanted}",
+            ),
+            (too_few, f"return 3 finite {wanted}"),
+            (imaginary, rf"j\s*\]; return 3 finite {wanted}"),
+            (lambda _: None, "update returned None; return 3"),
             (leaving, "SystemExit: enough"),
             (division, "ZeroDivisionError: no way on"),
         ):
@@ -138,15 +211,18 @@ def test_the_state_of_a_controller_cannot_be_written(planar_file: Path) -> None:
             robot.move_to([0.0, 1.4])
 
 
-def test_tensions_are_limited_to_the_robots_bounds(planar_file: Path) -> None:
+@pytest.mark.parametrize("kind", [PoseController, TorquePoseController])
+def test_tensions_are_limited_to_the_robots_bounds(
+    planar_file: Path, kind: type[PoseController]
+) -> None:
     seen: list[np.ndarray] = []
 
-    class Pulling(PoseController):
+    class Pulling(kind):  # type: ignore[misc, valid-type]
         def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
             seen.append(state.tension_N.copy())
-            return super().update(state, target)
+            return np.asarray(super().update(state, target))
 
-    mine = Pulling(lambda tensions: tensions + 1e4 * np.arange(-1.0, 2.0))
+    mine = Pulling(lambda tensions: 1e4 * np.array([-1.0, 0.0, 1.0]))
     model = cdpr.load("planar-3")
     with cdpr.simulate(planar_file, controller=mine) as robot:
         robot.enable()
@@ -157,6 +233,19 @@ def test_tensions_are_limited_to_the_robots_bounds(planar_file: Path) -> None:
     low_N, high_N = seen[-1].min(), seen[-1].max()
     assert low_N == model.low_N.min()
     assert model.high_N.max() <= high_N < 2.0 * model.high_N.max()
+
+
+@pytest.mark.parametrize("force", [3.0, [1.0, np.nan], [1.0, 2.0, 3.0], [1j, 2.0]])
+def test_distribute_rejects_anything_but_a_finite_force(planar_file: Path, force: Any) -> None:
+    class Scalar(PoseController):
+        def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+            return state.distribute(force)
+
+    with cdpr.simulate(planar_file, controller=Scalar()) as robot:
+        robot.enable()
+        robot.tighten()
+        with pytest.raises(cdpr.Faulted, match=r"distribute: force .*; give 2 finite numbers"):
+            robot.move_to([0.0, 1.4])
 
 
 def test_a_robot_without_a_platform_rejects_a_controller() -> None:

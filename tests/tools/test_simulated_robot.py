@@ -108,6 +108,7 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
         ([0.1, 1.8, 0.0], r"position_m: shape \(3,\); allowed: \(2,\), one number for each coord"),
         ([0.1, float("nan")], r"position_m\[1\]: nan; allowed: a finite number"),
         (["a", 1.0], r"position_m: \['a', 1\.0\]; allowed: 2 numbers"),
+        ([0.0, 1.8 + 1j], r"position_m: .*; allowed: 2 numbers"),
     ):
         with pytest.raises(cdpr.InvalidArgument, match=message):
             robot.move_to(target)
@@ -137,6 +138,10 @@ def test_wrong_shapes_and_values_move_nothing(robot: cdpr.Robot) -> None:
     for wrong in ({0.0, 1.8}, [0.0, float("nan")]):
         with pytest.raises(cdpr.InvalidArgument, match=r"position_m: .*; allowed: texts, finite"):
             robot.run("pose", position_m=wrong)
+    for wrong in (1j, np.zeros((0, 3)), {1}):
+        for call in (robot.run, lambda fault: robot.inject_fault(0, fault)):
+            with pytest.raises(cdpr.Error, match=r"allowed: "):
+                call(wrong)
     robot.run("pose", position_m=robot.position_m)  # an array is a list of numbers
     for wrong in ("pos", ["time_s", "pose"]):
         with pytest.raises(cdpr.InvalidArgument, match=r"fields: \[.*\]; allowed: cycle, time_s"):

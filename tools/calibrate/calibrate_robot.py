@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot as Profile
 from cdpr_profiles.errors import ProfileError
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, real_array
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
 from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot
+from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot, number_in, path_of, texts_of
 from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.finish import concluded, stop_criterion
 from cdpr_tools.calibrate.measure_poses import PoseOperator
@@ -30,7 +30,7 @@ Measure = Callable[[FloatArray], ArrayLike | None]
 
 nan is an unknown coordinate, None an unknown position.
 """
-_LEAST_m, _MOST_m = 1e-6, 0.5
+_ALLOWED_m = (1e-6, 0.5)
 
 
 def calibrate(
@@ -63,14 +63,19 @@ def calibrate(
     changes, `predicted_3_sigma_mm`, `report` and more. Progress goes to standard error. Raises
     InvalidRobot, InvalidArgument, Error, and what `measured` raises; poses that were read are kept.
     """
+    if not isinstance(robot, Robot):
+        raise InvalidArgument(f"robot: {robot!r}; give what simulate, connect or run returns")
+    if measured is not None and not callable(measured):
+        raise InvalidArgument(f"measured: {measured!r}; give a function of the position")
     out, on_status = Output(as_json=True), robot.on_status
     with _errors_of_calibrating():
         profile = daemon_run.profile_of(robot.description)
-        _require_length("measured_std_m", measured_std_m)
+        measured_std_m = number_in("measured_std_m", measured_std_m, *_ALLOWED_m, " m")
         known = Knowledge()
         if known_exit_m is not None:
-            known = Knowledge(exit_m=_require_length("known_exit_m", known_exit_m))
-        geometry = CableGeometry.of(profile, identify, known)
+            exit_m = number_in("known_exit_m", known_exit_m, *_ALLOWED_m, " m")
+            known = Knowledge(exit_m=exit_m)
+        geometry = CableGeometry.of(profile, texts_of("identify", identify), known)
         count, listed = poses_wanted(profile, None if poses is None else str(poses))
         kept = _poses_in(profile, robot, folder, resume)
         file = kept.folder / POINTS
@@ -98,17 +103,15 @@ def calibrate(
         )
 
 
-def _require_length(name: str, length_m: float) -> float:
-    if not _LEAST_m <= length_m <= _MOST_m:
-        raise InvalidArgument(f"{name}: {length_m!r}; allowed: {_LEAST_m:g} to {_MOST_m:g} m")
-    return length_m
-
-
 def _poses_in(
     profile: Profile, robot: Robot, folder: str | Path | None, resume: bool
 ) -> daemon_run.DaemonPoses:
     """Return the poses in a folder; raises InvalidArgument for earlier ones unless `resume`."""
-    where = Path("out") / f"calibrate-{profile.profile}" if folder is None else Path(folder)
+    where = (
+        Path("out") / f"calibrate-{profile.profile}"
+        if folder is None
+        else path_of("folder", folder)
+    )
     data = daemon_run.data_of(where, profile, bool(robot.description["simulated"]))
     if data.poses and not resume:
         raise InvalidArgument(
@@ -133,7 +136,7 @@ def _asking(
         if answer is None:
             return
         try:
-            position = np.asarray(answer, float)
+            position = real_array(answer)
         except (TypeError, ValueError):
             position = np.array(np.inf)
         if position.shape != (k,) or np.isinf(position).any():

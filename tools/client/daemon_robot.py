@@ -33,6 +33,7 @@ from cdpr_rt.robot import (
     Refused,
     Robot,
     path_of,
+    texts_of,
 )
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSession
@@ -123,7 +124,7 @@ def run(
     daemon does not start, or does not confirm at its end that the power is off.
     """
     _require_no_daemon(str(robot))
-    buses = _texts("bus", bus or ())
+    buses = texts_of("bus", bus or ())
     with _errors_of_opening():
         profile = load_robot(robot)
         try:
@@ -144,7 +145,9 @@ def run(
         ("--tension-distribution", tension_distribution),
     ):
         options += [] if value is None else [option, str(value)]
-    options += [word for program in _texts("programs", programs) for word in ("--program", program)]
+    options += [
+        word for program in texts_of("programs", programs) for word in ("--program", program)
+    ]
     options += ["--allow-code"] * allow_code
     with ExitStack() as stack, _errors_of_opening():
         try:
@@ -159,13 +162,6 @@ def run(
         process.lowering_s = float(backend.description.get("lowering_s", 0.0))
         backend.opened = stack.pop_all()
         return Robot(backend)
-
-
-def _texts(name: str, value: str | Sequence[str]) -> list[str]:
-    texts = [value] if isinstance(value, str) else value
-    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
-        raise InvalidArgument(f"{name}: {value!r}; allowed: a text, or a list of texts")
-    return list(texts)
 
 
 def _require_no_daemon(robot: str) -> None:

@@ -16,7 +16,7 @@ from cdpr_profiles import Winch, load_winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.errors import ControlError, InterruptedMotionError, InvalidRequestError, TripError
 from cdpr_rt.identification.commissioning_results import Paths, assemble, identify
-from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot
+from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot, number_in, path_of
 from cdpr_tools.commission import summary
 from cdpr_tools.commission.commissioning import (
     DEFAULT_BANDWIDTH_HZ,
@@ -118,16 +118,19 @@ def commission(
     or a limit ends the motion, and Error. Call it from the main thread.
     """
     with _errors_of_commissioning():
+        for name, text in (("bus", bus), ("index", index), ("safety_io", safety_io)):
+            if not isinstance(text, str) and (text is not None or name != "safety_io"):
+                raise InvalidArgument(f"{name}: {text!r}; allowed: a text")
         if index not in ("homing", "probe"):
             raise InvalidArgument(f"index: {index!r}; allowed: 'homing', 'probe'")
-        if not 1.0 <= bandwidth_Hz <= 100.0:
-            raise InvalidArgument(f"bandwidth_Hz: {bandwidth_Hz!r}; allowed: 1 to 100")
+        bandwidth_Hz = number_in("bandwidth_Hz", bandwidth_Hz, 1.0, 100.0)
         profile, url = load_winch(winch), open_bus(bus)
         if not (url.is_simulated or yes):
             raise InvalidArgument(f"yes: False; the real motor on {url} will turn; give yes=True")
-        out = Path("out") / f"commission-{profile.profile}" if folder is None else Path(folder)
+        usual = f"out/commission-{profile.profile}"
+        out = path_of("folder", usual if folder is None else folder)
         request = Request(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
-        plant_file = None if plant is None else Path(plant)
+        plant_file = None if plant is None else path_of("plant", plant)
         paths = prepare(out, overwrite)
         with _ctrl_c_kept():
             return commission_winch(profile, url, paths, request, Output(as_json=True), plant_file)
