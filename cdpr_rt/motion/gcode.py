@@ -6,6 +6,7 @@ Supported are the codes of RS274/NGC that have a meaning for a platform without 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -99,8 +100,8 @@ _MOTIONS: Final = ("G0", "G1", "G2", "G3")
 _CYCLES: Final = ("G73", "G81", "G82", "G83")
 _SYSTEMS: Final = ("G54", "G55", "G56", "G57", "G58", "G59")
 _OFFSETS: Final = ("G92", "G92.1", "G92.2", "G92.3")
-_PRINTING: Final = ("G10", "G11", "G29")
-"""Retraction, its end, and levelling of a printer's bed; G10 L sets data of a machine."""
+_PRINTING: Final = ("G10", "G11", "G26", "G29")
+"""Retraction, its end, and test and levelling of a printer's bed; G10 L sets data of a machine."""
 _PLANES: Final = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 _GROUPS: Final = (
     (*_MOTIONS, *_CYCLES, "G80"), ("G4", *_PRINTING, "G28", *_OFFSETS), tuple(_PLANES),
@@ -191,8 +192,8 @@ def read_gcode(
     """Return the path that a G-code file describes.
 
     It begins when all coordinates have been named once. X Y Z are mm, or inches after G20, from the
-    origin; A B C are degrees, the rotation vector from home's orientation. F is mm or inches per
-    minute along the path; for moves that only turn, degrees per minute. Raises PathError, which
+    origin; A B C are degrees about X Y Z from home's orientation, one at a time. F is mm or inches
+    per minute along the path; for moves that only turn, degrees per minute. Raises PathError, which
     lists all faults of the file.
     """
     return _Reader(source, coordinates, settings).read(text)
@@ -229,6 +230,8 @@ class _Reader:
         """Stops that precede the beginning of the path."""
         self._long_dwells: list[tuple[int, float]] = []
         """Lines and seconds."""
+        self._turns: set[str] = set()
+        """Rotary axes that the path uses."""
         self._last = 0
         self._in_room = False
 
@@ -245,6 +248,8 @@ class _Reader:
             missing = self._missing()
             why = f"{missing} is never given" if missing else "nothing moves"
             hint = ": give the height with --z" if missing == "Z" else ""
+            if missing and not hint:
+                hint = f"; begin with a position, such as G0 {missing.replace(' ', '0 ')}0"
             # a rejected line may contain the missing coordinate
             if not found.problems:
                 found.refuse(self._last, f"{why}; allowed: a path through two positions{hint}")
@@ -256,6 +261,11 @@ class _Reader:
             more = f" (first of {len(self._long_dwells)})" if len(self._long_dwells) > 1 else ""
             found.notes.append(
                 f"line {line}: a dwell of {seconds:g} s{more}; --dwell {other} reads P in {other}"
+            )
+        if self._turns and len(self._letters) > self._k + 1:
+            found.notes.append(
+                f"{' '.join(sorted(self._turns))}: turns the platform from home, about X, Y or Z "
+                "of the room; it is not a rotary table"
             )
         self._path.notices += found.notices()
         self._path.in_room = self._in_room
@@ -439,18 +449,33 @@ class _Reader:
         target = self._target_in_room(words) if in_room else self._target(words)
         arc = self._arc(words, target) if motion in ("G2", "G3") else None
         if self._path is None and arc is not None:
-            raise _LineError(f"{motion}: {self._missing()} unknown; move there first")
+            raise _LineError(f"{motion}: {self._missing() or 'position'} unknown; move there first")
         self._append(block.line, target, motion, arc)
 
     def _append(self, line: int, target: FloatArray, motion: str, arc: Arc | None = None) -> None:
         """Append a move to `target`; the path begins when all coordinates have been named."""
         state, path = self._state, self._path
         start, state.here = state.here, target
+        self._note_turn(start, target)
         if path is None:
             self._begin(line)
             return
         speed = math.inf if motion == "G0" else self._speed(start, target, motion, arc)
         path.add(Move(line, self._room(target), speed, state.blend_m, arc=arc))
+
+    def _note_turn(self, start: FloatArray, target: FloatArray) -> None:
+        """Note the rotary axis of a move; reject more than one, whose order is unknown."""
+        k = self._k
+        used = (start[k:] != 0.0) | (target[k:] != 0.0)
+        turned = [
+            letter for letter, is_used in zip(self._letters[k:], used, strict=True) if is_used
+        ]
+        if len(turned) > 1:
+            raise _LineError(
+                f"{' '.join(turned)}: the orientation depends on a machine's order of rotations; "
+                "allowed: one of A B C other than 0 at a time (way points take rotation_rad)"
+            )
+        self._turns.update(turned)
 
     def _begin(self, line: int) -> None:
         """Begin the path if all coordinates have been named."""
@@ -500,11 +525,21 @@ class _Reader:
             if radius is not None:
                 arc = arc_by_radius(first, last, radius * unit_m, clockwise)
             else:
-                middle = np.array([centre.get(i, 0.0) * unit_m for i in (u, v)])
-                middle += first if state.relative_centres else state.offset[[u, v]]
-                arc = arc_by_centre(first, last, middle, clockwise)
+                given = np.array([centre.get(i, 0.0) * unit_m for i in (u, v)])
+                bases = first, state.offset[[u, v]]
+                if not state.relative_centres:
+                    bases = bases[::-1]
+                arc = arc_by_centre(first, last, given + bases[0], clockwise)
         except ValueError as error:
-            raise _LineError(f"{state.motion}: {error}") from None
+            problem = str(error)
+            if len(centre) == 2:
+                kind, code = ("absolute", "G90.1")
+                if not state.relative_centres:
+                    kind, code = ("relative", "G91.1")
+                with suppress(ValueError):
+                    arc_by_centre(first, last, given + bases[1], clockwise)
+                    problem = f"its centre fits only as {kind} coordinates: add {code}"
+            raise _LineError(f"{state.motion}: {problem}") from None
         place, normal = start.copy(), np.zeros(3)
         place[[u, v]] = arc.centre_m
         if k > 2:

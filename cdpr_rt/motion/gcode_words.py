@@ -279,7 +279,8 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
         if letter == "N":
             continue
         seconds = letter == "S" and "G4" in codes
-        if (letter in IDLE_LETTERS and not seconds) or letter in ignored:
+        output = letter == "P" and alone and not codes  # as in Mach3's M11 P1
+        if (letter in IDLE_LETTERS and not seconds) or letter in ignored or output:
             findings.ignore(number, letter)
         elif name in _IDLE_CODES:
             findings.ignore(number, name)

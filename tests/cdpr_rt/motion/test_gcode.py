@@ -43,7 +43,7 @@ def test_the_path_begins_after_all_coordinates_were_named():
     path = read("G0 Z50", "G0 X1 Y2", "G1 X5 F100", "M30", origin=(0.1, 0.2, 0.3))
     np.testing.assert_allclose(path.start[:3], [0.101, 0.202, 0.35])
     assert len(path.moves) == 1
-    with pytest.raises(PathError, match=r"part.nc:3: Y is never given"):
+    with pytest.raises(PathError, match=r"part.nc:3: Y is never given; .* G0 Y0"):
         read("G0 X1 Z2", "X5", "M2")
 
 
@@ -287,9 +287,35 @@ def test_placement_rotates_and_mirrors_rotation_vectors():
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     path = read("G0 X0 Y0 Z0", "X10 A5", "M2", placement=2.0 * turn)
     np.testing.assert_allclose(path.moves[0].end, [0, 0.02, 0, 0, math.radians(5), 0], atol=1e-12)
-    path = read("G0 X0 Y0 Z0", "X10 A5 C5", "M2", placement=np.diag([-1.0, 1.0, 1.0]))
     angle = math.radians(5.0)
-    np.testing.assert_allclose(path.moves[0].end, [-0.01, 0, 0, angle, 0, -angle], atol=1e-12)
+    for letter, rotation in (("A", [angle, 0, 0]), ("C", [0, 0, -angle])):
+        path = read("G0 X0 Y0 Z0", f"X10 {letter}5", "M2", placement=np.diag([-1.0, 1.0, 1.0]))
+        np.testing.assert_allclose(path.moves[0].end, [-0.01, 0, 0, *rotation], atol=1e-12)
+
+
+def test_a_program_for_five_axes_is_rejected_and_one_rotary_axis_is_noted():
+    with pytest.raises(PathError, match=r"part.nc:2: A C: the orientation depends .* \(3 lines\)"):
+        read("G0 X0 Y0 Z0", "X10 A5 C5", "C6", "A0", "X20", "M2")
+    with pytest.raises(PathError, match=r"part.nc:3: A B: "):
+        read("G0 X0 Y0 Z0 A5", "X10", "A0 B5", "M2")
+    path = read("G0 X0 Y0 Z0", "A5", "A0", "B5", "M2")
+    assert path.notices == [
+        "A B: turns the platform from home, about X, Y or Z of the room; it is not a rotary table"
+    ]
+
+
+def test_a_rejected_arc_names_the_other_kind_of_centre_if_that_fits():
+    lines = ("G0 X-40 Y50 Z0", "{} G3 X-30 Y40 I{} J{} F60", "M2")
+    for code, i, j, hint in (("G91.1", -40, 40, "G90.1"), ("G90.1", 0, -10, "G91.1")):
+        with pytest.raises(PathError, match=rf"centre fits only as .*: add {hint}$"):
+            read(*(line.format(code, i, j) for line in lines))
+    with pytest.raises(PathError, match=r"equal distances$"):
+        read(*(line.format("G91.1", 3, 3) for line in lines))
+
+
+def test_a_number_of_an_output_belongs_to_its_code():
+    assert ends_mm(read("G0 X0 Y0 Z0", "M11P1", "X5", "M10 P1", "M2")) == [[5, 0, 0]]
+    assert read("G0 X0 Y0 Z0", "X5", "M11 G4 P2", "M2").moves[1].dwell_s == 2.0
 
 
 def test_line_ends_spaces_comments_and_byte_order_mark_do_not_matter():
