@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -69,3 +70,28 @@ def test_commissioning_and_simulation_need_no_daemon_packages(
         f"import sys; sys.modules.update(dict.fromkeys({absent}))\n"
         f"import cdpr_tools.commands.{module}"
     )
+
+
+FIRST = """
+import os, pathlib, sys
+import can, numba, numpy, pydantic, scipy.optimize, typer  # loaded once, because they are slow
+
+for path in sorted(pathlib.Path(sys.argv[1]).rglob("*.py")):
+    if "__name__ == " not in path.read_text() and path.parent.name != "commands":
+        continue
+    module = ".".join(("cdpr_tools", *path.relative_to(sys.argv[1]).with_suffix("").parts))
+    child = os.fork()
+    if child == 0:
+        os._exit(not __import__(module))
+    print(module, os.waitpid(child, 0)[1])
+"""
+
+
+def test_each_module_of_a_command_or_process_can_be_loaded_first() -> None:
+    tools = str(Path(cli.__file__).parent)
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST, tools], capture_output=True, text=True, check=False
+    )
+    codes = dict(line.split() for line in done.stdout.splitlines())
+    assert {"cdpr_tools.commands.poses", "cdpr_tools.robots.workspace_border"} <= set(codes)
+    assert set(codes.values()) == {"0"}, done.stderr
