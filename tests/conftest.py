@@ -58,6 +58,18 @@ def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+@pytest.fixture(scope="module")
+def slower_profiles(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Give shipped robots longer cycles under the same names."""
+    from tests import slower_robot  # noqa: PLC0415  # loads numpy
+
+    with pytest.MonkeyPatch.context() as patch:
+        config = tmp_path_factory.mktemp("config")
+        slower_robot.slower_profiles(config)
+        patch.setenv("XDG_CONFIG_HOME", str(config))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def signals_as_before() -> Iterator[None]:
     """Restore the signal handlers after each test.
@@ -169,8 +181,12 @@ def _judge_vcan(session: pytest.Session) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run daemon tests first: they are the longest sequence in a single process."""
-    items.sort(key=lambda item: not _of_a_daemon(item.nodeid))
+    """Run daemon tests first, the longest sequence in a single process, then files with long tests.
+
+    A long file at the end would leave all other processes idle.
+    """
+    long = {item.path for item in items if item.get_closest_marker("long")}
+    items.sort(key=lambda item: (not _of_a_daemon(item.nodeid), item.path not in long))
 
 
 def pytest_collection_finish() -> None:

@@ -9,11 +9,17 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
 
 PERIOD_S = 0.004
+ROBOTS = ("planar-3", "planar-4", "spatial-8", "suspended-8")
 
 
 def slower_robot(folder: Path, name: str | Path, period_s: float = PERIOD_S) -> Path:
     """Write a robot with longer cycles. Return its file."""
     return _slower(load_robot(name).path, folder, period_s)
+
+
+def slower_winch(folder: Path, name: str, period_s: float) -> Path:
+    """Write a winch with longer cycles. Return its file."""
+    return _slower(SHIPPED / "winches" / f"{name}.toml", folder, period_s)
 
 
 def _slower(given: Path, folder: Path, period_s: float) -> Path:
@@ -32,8 +38,7 @@ def slower_profiles(config: Path) -> None:
     """
     own = config / "cdpr-rt" / "profiles"
     for kind, name, period_s in (
-        ("robots", "planar-3", PERIOD_S),
-        ("robots", "planar-4", PERIOD_S),
+        *(("robots", name, PERIOD_S) for name in ROBOTS),
         ("winches", "winch-mpp0923d", 0.5 * PERIOD_S),  # its commissioning needs a stiffer loop
     ):
         (own / kind).mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ import pytest
 
 from cdpr_rt.diagnosis.checks import refuse_impossible
 from cdpr_rt.model.statics import statics_of
-from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 
 OTHERS = sorted((Path(__file__).parent / "others").glob("*.toml"))
 START_m = 0.003
@@ -18,7 +18,7 @@ START_m = 0.003
 
 @pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)
 def test_a_robot_of_another_user_starts_moves_and_rests(path: Path) -> None:
-    with LockstepRobot(path) as robot:
+    with local_robot(path) as robot:
         refuse_impossible(robot.robot)
         statics = statics_of(robot.robot)
         robot.enable()

@@ -12,6 +12,8 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_sim_bus.robot.robot_plant import PlatformPlant, RobotPlant
 from tests.cdpr_rt.platform.platform_physics import Machine, Physics, hung
 
+pytestmark = pytest.mark.long
+
 MACHINES = {
     "mass in the middle": hung(),
     "mass beside the middle": hung(centre_m=(0.02, -0.02, -0.08)),

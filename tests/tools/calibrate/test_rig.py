@@ -21,7 +21,7 @@ from cdpr_tools.calibrate.measure_poses import (
 from cdpr_tools.calibrate.places import chosen_places
 from cdpr_tools.calibrate.rig import OutsidePose, simulated_rig
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("slower_profiles")]
 
 _PLANT = """
 [geometry]

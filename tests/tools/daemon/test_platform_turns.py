@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
+
+pytestmark = pytest.mark.long
 
 TURN_rad = 0.15
 
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LockstepRobot]:
-    with LockstepRobot(slower_robot(tmp_path_factory.mktemp("turning"), "planar-4")) as opened:
+    with local_robot(slower_robot(tmp_path_factory.mktemp("turning"), "planar-4")) as opened:
         opened.enable()
         opened.carry_out("tighten", 60.0)
         yield opened
@@ -71,7 +74,7 @@ def way_mm(robot: LockstepRobot, seconds: float = 1.5) -> float:
     """Return the largest distance from the set-point within `seconds`."""
     lags = []
     for _ in range(round(seconds / 0.01)):
-        robot.turn(10)
+        robot.run(0.01)
         lags.append(lag_mm(robot))
     return max(lags)
 
@@ -88,7 +91,7 @@ def test_a_platform_follows_its_set_point_when_leaving_the_stand(
     tmp_path: Path, name: str, plant: str, waits_s: float, most_mm: float
 ) -> None:
     (tmp_path / "plant.toml").write_text(plant)
-    with LockstepRobot(name, plant=tmp_path / "plant.toml") as robot:
+    with local_robot(slower_robot(tmp_path, name, 0.002), plant=tmp_path / "plant.toml") as robot:
         platform = robot.robot.platform
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         robot.enable()
@@ -100,7 +103,7 @@ def test_a_platform_follows_its_set_point_when_leaving_the_stand(
 
 
 def test_a_platform_follows_a_hand_off_its_stand() -> None:
-    with LockstepRobot("planar-3") as robot:
+    with local_robot("planar-3") as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.program("pose", stream=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.core.states import LoopState
-from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 
 pytestmark = pytest.mark.long
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.long
 def test_an_oscillating_loop_is_reported_in_the_status(tmp_path: Path) -> None:
     plant = tmp_path / "plant.toml"
     plant.write_text("[motor.drive]\nfeedback_delay_s = 0.0055\n")
-    with LockstepRobot("planar-4", plant=plant) as robot:
+    with local_robot("planar-4", plant=plant) as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[0.0, 1.55])
