@@ -357,7 +357,7 @@ def _become(request: dict[str, Any], descriptors: list[int]) -> NoReturn:
     sys.path += request["env"].get("PYTHONPATH", "").split(os.pathsep)
     if module == _LAUNCHER_RIG or arguments[:1] == [_LAUNCHES]:
         _get_own_server(descriptors)
-    if module in (_COMMAND, _LAUNCHER_RIG) and _FINDS_ITS_CHILDREN not in arguments[:2]:
+    if module in (_COMMAND, _LAUNCHER_RIG, _SCRIPT) and _FINDS_ITS_CHILDREN not in arguments[:2]:
         install()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.sched_setaffinity(0, request["cores"])

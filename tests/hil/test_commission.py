@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 from cdpr_here import cdpr_here
 
-import cdpr_profiles
+from cdpr_rt.identification.commissioning_results import Paths
+from tests.slower_robot import slower_robot, slower_winch
+from tests.test_examples import run_example
 
 PLANTS = Path(__file__).parent / "plants"
-SHIPPED = Path(cdpr_profiles.__file__).parent
 
 
 def cdpr(*arguments: str | Path, timeout_s: float = 300.0) -> subprocess.CompletedProcess[str]:
@@ -36,27 +37,21 @@ def commission(
     return last_line(cdpr(*base, "--out", out, *more))
 
 
-def winch_in_cycles(folder: Path, period_s: float) -> Path:
-    """Write the shipped winch with a lower cycle rate, which takes less time."""
-    path = folder / f"winch-{1e3 * period_s:g}ms.toml"
-    shipped = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
-    text = shipped.replace("sync_period_s = 0.001", f"sync_period_s = {period_s}")
-    assert text != shipped
-    path.write_text(text)
-    return path
-
-
 @pytest.fixture(scope="module")
 def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return winch_in_cycles(tmp_path_factory.mktemp("winch"), 0.004)
+    return slower_winch(tmp_path_factory.mktemp("winch"), "winch-mpp0923d", 0.004)
 
 
 @pytest.fixture(scope="module")
-def default(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """Commission with a tenth of the measurements. `make demo` takes them all."""
-    out = tmp_path_factory.mktemp("default")
-    winch = winch_in_cycles(tmp_path_factory.mktemp("winch"), 0.002)
-    return out, commission(out, "--quick", winch=winch)
+def default(
+    slower_profiles: None, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, dict[str, Any]]:
+    """Commission by the example with a tenth of the measurements. `make demo` takes them all."""
+    folder = tmp_path_factory.mktemp("default")
+    printed = ["cogging of order 4: ", "compensation harmonic: 0.", "report: "]
+    run_example("commission_motor.py", folder, printed)
+    paths = Paths(folder / "commission_motor")
+    return paths.out, json.loads(paths.results.read_text())
 
 
 def test_commissioning_the_default_plant_reaches_the_documented_figures(
@@ -146,10 +141,15 @@ def test_an_odd_motor_of_a_robot_is_compensated(tmp_path: Path) -> None:
         odd = odd.replace(key, text)
     seed, tables = odd.split("\n", 1)
     plant.write_text(seed + "\n" + re.sub(r"(?m)^(\[+)", r"\1motor.", tables))
-    robot = tmp_path / "planar-3-slower.toml"
-    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
-    robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
-    base = ("commission", robot, "--axis", "upper right", "--bus", "simbus:", "--quick")
+    base = (
+        "commission",
+        slower_robot(tmp_path, "planar-3"),
+        "--axis",
+        "upper right",
+        "--bus",
+        "simbus:",
+        "--quick",
+    )
     told = last_line(cdpr(*base, "--plant", plant, "--out", tmp_path, "--json"))
     assert list(told["axes"]) == ["upper right"]
     assert (Path(told["commissioned"]) / "upper-right" / "cogging-profile.json").is_file()
