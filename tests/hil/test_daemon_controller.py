@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from daemon_rig import RealDaemon
 from daemon_rig import cdpr as run_cdpr
-from test_daemon_platform import PERIOD_S, SHIPPED
 
 import cdpr_rt as cdpr
+from tests.slower_robot import slower_robot
 
 MINE = """
 import time
@@ -69,12 +69,10 @@ def middle(W, w, low, high, previous):
 
 @contextmanager
 def running(folder: Path, controller: str, paced: bool = False) -> Iterator[RealDaemon]:
-    file, robot = folder / "mine.py", folder / "planar.toml"
+    file, robot = folder / "mine.py", slower_robot(folder, "planar-3")
     file.write_text(MINE)
-    shipped = (SHIPPED / "planar-3.toml").read_text()
-    shipped = shipped.replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}")
     named = '[platform]\ntension_distribution = "mine.py:middle"'
-    robot.write_text(shipped.replace("[platform]", named))
+    robot.write_text(robot.read_text().replace("[platform]", named))
     env = {"XDG_STATE_HOME": str(folder)}
     mine = ("--no-record", "--controller", f"{file}:{controller}", "--allow-code")
     mine += ("--program", f"{file}:Side")

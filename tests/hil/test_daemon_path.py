@@ -16,10 +16,10 @@ from typing import Any
 import pytest
 from daemon_rig import RealDaemon, cdpr, held_right, until
 from test_daemon_kills import third_party
-from test_daemon_platform import PERIOD_S, SHIPPED
 from test_daemon_teleop import start_up
 
 from cdpr_drivers.bus import BusUrl
+from tests.slower_robot import slower_robot
 
 GCODE = "G21 G90 G64 P10\nG0 X-200 Y0\nG1 X100 F4000\nY100\nG3 X0 Y100 I-50 J0\nG1 X-200\nM2\n"
 ENCODER_FAULT = 0x7305  # by 2F00h
@@ -29,9 +29,7 @@ HELD = "`cdpr path resume` continues"
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "part.nc").write_text(GCODE)
-    robot = (SHIPPED / "planar-4.toml").read_text()
-    period = f"sync_period_s = {PERIOD_S}"
-    (tmp_path / "planar.toml").write_text(robot.replace("sync_period_s = 0.001", period))
+    slower_robot(tmp_path, "planar-4")
     return tmp_path
 
 
@@ -39,7 +37,7 @@ def folder(tmp_path: Path) -> Path:
 def running(folder: Path, status: int = 0) -> Iterator[RealDaemon]:
     """Yield a daemon with its platform off the stand on tight cables. It ends with `status`."""
     env = {"XDG_STATE_HOME": str(folder)}
-    one = RealDaemon(folder, "--no-record", robot=folder / "planar.toml", env=env)
+    one = RealDaemon(folder, "--no-record", robot=folder / "planar-4.toml", env=env)
     try:
         start_up(one)
         yield one

@@ -13,14 +13,12 @@ import pytest
 from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_kills import Ear
 
-import cdpr_profiles
 from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_tools.composition.simulator import OwnSimulator
+from tests.slower_robot import PERIOD_S, slower_robot
 
 pytestmark = pytest.mark.alone
 
-SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
-PERIOD_S = 0.004
 NODES = (1, 2, 3)
 # "disable voltage" is sent after the next SYNC, acts at the SYNC after it, and is then reported
 MOST_CYCLES = 3
@@ -45,9 +43,7 @@ def is_off(data: bytes) -> bool:
 @pytest.fixture
 def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
     """Yield a daemon with a suspended platform and a cycle that leaves time for others."""
-    robot = tmp_path / "planar.toml"
-    period = f"sync_period_s = {PERIOD_S}"
-    robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
+    robot = slower_robot(tmp_path, "planar-3")
     bus = f"simbus:second-{os.getpid()}"
     env = {"XDG_STATE_HOME": str(tmp_path)}
     simulator = OwnSimulator(
@@ -79,7 +75,7 @@ def test_a_second_ctrl_c_cuts_power_instead_of_lowering_the_platform(
         ear.close()
     assert "\nthe power is removed now" in hanging.errors()
     assert "; the platform was not lowered" in hanging.errors()
-    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.simulated.json").read_text())
+    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar-3.simulated.json").read_text())
     assert kept["stopped"] is False  # it has fallen since its lengths were last measured
     told_s, off_s, cycles = 0.0, 0.0, 0
     for node in NODES:

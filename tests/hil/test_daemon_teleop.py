@@ -20,7 +20,6 @@ from daemon_rig import RealDaemon, held_right, until
 from hostile_proxy import hostile
 from typer.testing import CliRunner
 
-import cdpr_profiles
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.motion.pose_stream import confirmation
@@ -28,9 +27,8 @@ from cdpr_rt.service.recording_reader import RecordingReader
 from cdpr_tools.commands.teleop import app
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.teleop import session as session_module
+from tests.slower_robot import PERIOD_S, slower_robot
 
-PERIOD_S = 0.004
-SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PLATFORM = load_robot("planar-3").platform
 RIGHT = b"\x1b[C"
 
@@ -43,11 +41,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def daemon(folder: Path) -> Iterator[RealDaemon]:
     """Yield a daemon of the shipped robot with a cycle that leaves time for other processes."""
-    robot = folder / "planar.toml"
-    period = f"sync_period_s = {PERIOD_S}"
-    robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
     options = ("--record", str(folder / "rec"))
-    one = RealDaemon(folder, *options, robot=robot)
+    one = RealDaemon(folder, *options, robot=slower_robot(folder, "planar-3"))
     try:
         start_up(one)
         yield one
