@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 CALLEE = "from cdpr_rt.jit import jit\n\n@jit\ndef inner(x):\n    return x + {added}\n"
 CALLER = """
 from cdpr_rt.jit import jit
@@ -28,16 +30,6 @@ def output_words(folder: Path, *words: str) -> list[str]:
         [sys.executable, "-B", *words], cwd=folder, capture_output=True, text=True, check=True
     )
     return done.stdout.split()
-
-
-def test_kernel_is_compiled_again_after_its_callee_changed(tmp_path: Path) -> None:
-    (tmp_path / "caller.py").write_text(CALLER)
-    callee = tmp_path / "kernels_callee.py"
-    callee.write_text(CALLEE.format(added=1.0))
-    assert output_words(tmp_path, "caller.py") == ["20.0", "0"]
-    assert output_words(tmp_path, "caller.py") == ["20.0", "1"]
-    callee.write_text(CALLEE.format(added=2.0))
-    assert output_words(tmp_path, "caller.py") == ["30.0", "0"]
 
 
 def test_kernel_is_compiled_again_after_an_indirect_callee_in_another_folder_changed(

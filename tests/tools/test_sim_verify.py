@@ -51,7 +51,7 @@ def wait_until(done: Callable[[], bool]) -> None:
 
 def test_a_motion_is_identical_beside_busy_and_with_stopped_processes(tmp_path: Path) -> None:
     keep = tmp_path / "kept"
-    options = ("--seed", "3", "--busy", "2", "--keep", keep)
+    options = ("--seed", "3", "--busy", "1", "--keep", keep)
     told = verified(*options, "--", *JOG, status=0)
     assert told["ok"] and told["seed"] == 3
     assert told["runs"][0]["stops"] == 0 < told["runs"][1]["stops"]

@@ -31,6 +31,8 @@ from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
 from tests.cdpr_rt.calibration.moving_robot import MovingErrors, moving_robot, uncrossed
 from tests.cdpr_rt.calibration.synthetic_readings import HAND_EYE_m
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(autouse=True)
 def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,18 +119,6 @@ def test_a_calibration_by_points_is_adopted_shown_and_undone(tmp_path: Path) -> 
     assert again.returncode == 2 and "no calibration is in force" in again.stderr
 
 
-def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
-    data_of(what, tmp_path / "data.json")
-    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path, "--dry-run", "--json")
-    told = result(done)
-    assert told["poses"] == 45 and told["data"] == str(tmp_path / "data.json")
-    assert f"fit it again: cdpr calibrate fit spatial-8 --data {tmp_path}" in done.stderr
-    assert "truth" not in told
-    nothing = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "nothing")
-    assert nothing.returncode == 2 and "nothing" in nothing.stderr
-
-
 def hardly_off(tmp_path: Path, seed: int, exit_m: float) -> list[Any]:
     """Return the command that fits data of a robot whose file is nearly right."""
     what = made_up(
@@ -185,13 +175,18 @@ def test_a_calibration_that_is_worse_only_by_noise_is_adopted_on_request(
     assert result(asked)["in_force"]["version"] == 1
 
 
-def test_a_fit_without_measured_points_keeps_the_frame_of_the_file(tmp_path: Path) -> None:
+def test_the_folder_of_a_run_is_fitted_without_points_in_the_frame_of_the_file(
+    tmp_path: Path,
+) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
-    data = data_of(what, tmp_path / "data.json")
-    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--json")
+    data_of(what, tmp_path / "data.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path, "--json")
     assert done.returncode == 1, done.stderr
+    assert f"fit it again: cdpr calibrate fit spatial-8 --data {tmp_path}" in done.stderr
     assert "NOT GOOD" in done.stderr and "--known-mm" in done.stderr
     told = result(done)
+    assert told["poses"] == 45 and told["data"] == str(tmp_path / "data.json")
+    assert "truth" not in told
     assert told["frame"].startswith("the robot's file")
     assert np.linalg.norm(told["absolute_shift_mm"]) < told["absolute_3_sigma_mm"] < 40.0
     assert told["in_force"] is None and calibrated(load_robot("spatial-8")).calibration is None
@@ -200,6 +195,8 @@ def test_a_fit_without_measured_points_keeps_the_frame_of_the_file(tmp_path: Pat
     residuals = told["verification"]
     assert residuals["reference"] == "none" and residuals["scale_factor"] is None
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
+    nothing = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "nothing")
+    assert nothing.returncode == 2 and "nothing" in nothing.stderr
 
 
 def test_a_slipped_encoder_is_reported_and_tolerated(tmp_path: Path) -> None:
@@ -373,24 +370,24 @@ def test_markers_and_cables_are_fitted_together(tmp_path: Path) -> None:
     assert "or the places of three markers" in done.stderr
 
 
-@pytest.mark.parametrize(("off_m", "believed"), [(0.0, True), (0.05, False)])
-def test_a_hand_eye_file_is_used_if_it_agrees_with_the_readings(
-    tmp_path: Path, off_m: float, believed: bool
-) -> None:
+def test_a_hand_eye_file_is_used_if_it_agrees_with_the_readings(tmp_path: Path) -> None:
     made = camera_robot(20, hand_eye_known=False).made.data
     assert made.camera is not None and made.camera.hand_eye is None
     made.save(tmp_path / "data.json")
     told, (x_m, *rest_m) = tmp_path / "hand-eye.toml", HAND_EYE_m
-    told.write_text(f"position_m = {[x_m + off_m, *rest_m]}\nrotation_deg = [180.0, 0.0, 0.0]\n")
     fit = ("calibrate", "fit", "spatial-8", "--dry-run", "--json", "--data", tmp_path / "data.json")
-    without = result(cdpr_here(*fit, "--out", tmp_path / "a"))
-    done = result(cdpr_here(*fit, "--hand-eye", told, "--out", tmp_path / "b"))
-    for one in (without, done):
-        assert one["camera"]["position_m"] == pytest.approx(HAND_EYE_m, abs=0.01)
-    named = [fault["text"] for fault in done["faults"] if fault["kind"] == "hand_eye"]
-    assert [("hand_eye" in text, "mm" in text) for text in named] == [(True, True)] * (not believed)
+    without = result(cdpr_here(*fit, "--out", tmp_path / "without"))
     as_without = pytest.approx(without["camera"]["position_m"], abs=1e-5)
-    assert (done["camera"]["position_m"] != as_without) == believed
+    for off_m, believed in ((0.0, True), (0.05, False)):
+        place_m = [x_m + off_m, *rest_m]
+        told.write_text(f"position_m = {place_m}\nrotation_deg = [180.0, 0.0, 0.0]\n")
+        done = result(cdpr_here(*fit, "--hand-eye", told, "--out", tmp_path / str(off_m)))
+        for one in (without, done):
+            assert one["camera"]["position_m"] == pytest.approx(HAND_EYE_m, abs=0.01)
+        named = [fault["text"] for fault in done["faults"] if fault["kind"] == "hand_eye"]
+        assert all("hand_eye" in text and "mm" in text for text in named)
+        assert len(named) == (not believed)
+        assert (done["camera"]["position_m"] != as_without) == believed
 
 
 def test_a_check_fits_the_map_with_the_options_of_the_calibration(
