@@ -46,7 +46,7 @@ from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells, RobotSimulator
 from cdpr_tools.errors import BadInputError, CommandError
-from cdpr_tools.recordings.pose_log import PoseLogTail
+from cdpr_tools.recordings.truth import POSES, RecordLog
 
 if TYPE_CHECKING:
     from cdpr_rt.service.recording import Recorder
@@ -243,7 +243,7 @@ class LockstepRobot:
         self.cells: OwnLoadCells
         """The simulated load cells of a robot whose file names `tension_sensors`."""
         self.recorder: Recorder | None = None
-        self._truth: PoseLogTail | None = None
+        self._truth: RecordLog | None = None
 
     def __enter__(self) -> Self:
         with self._stack as stack:
@@ -302,7 +302,7 @@ class LockstepRobot:
             self.boot()
         self._began = self.rows_written
         if not robot.is_winch:  # the log of a single drive has another format
-            self._truth = stack.enter_context(PoseLogTail(simulator.truth_log))
+            self._truth = stack.enter_context(RecordLog(simulator.truth_log, POSES))
         if self._pinned and own is not None:
             stack.enter_context(one_core(own.process.pid))
 

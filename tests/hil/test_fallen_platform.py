@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.robot import Refused
 from cdpr_tools.lockstep_robot import LockstepRobot
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 

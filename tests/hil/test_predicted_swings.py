@@ -11,7 +11,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.diagnosis.predictions import SWING_S, CableLoss
 from cdpr_rt.diagnosis.subject import Subject
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 

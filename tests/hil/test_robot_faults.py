@@ -22,7 +22,7 @@ from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.robot import Error, Refused
 from cdpr_tools.lockstep_robot import LockstepRobot, StreamSender
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 from tests.local_robot import local_robot
 from tests.profiles.test_geometry_calibration import calibration
 from tests.slower_robot import slower_robot

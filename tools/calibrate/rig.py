@@ -14,7 +14,6 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 from typing_extensions import override
 
-from cdpr_profiles.bounded_input import parse_json
 from cdpr_profiles.geometry_calibration import write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
@@ -28,6 +27,7 @@ from cdpr_tools.calibrate.measure_poses import (
 )
 from cdpr_tools.client.daemon_robot import robot_errors
 from cdpr_tools.lockstep_robot import LockstepRobot
+from cdpr_tools.recordings.truth import SCANNER, RecordLog
 
 if TYPE_CHECKING:
     from cdpr_tools.calibrate.pose_camera import PoseCamera
@@ -73,33 +73,6 @@ class OutsidePoses(Profile):
         return read_json_model(Path(path), cls)
 
 
-_HEADER_BYTES = 1024
-
-
-class ScannerTail:
-    """The log of a simulated scanner, read while it is written."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with path.open("rb") as file:
-            header = parse_json(file.read(_HEADER_BYTES), path)
-        self._dtype = np.dtype(
-            [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
-        )
-        self.position_std_m = float(header["position_sigma_m"])
-        self.rotation_std_rad = float(header["rotation_sigma_rad"])
-
-    def count(self) -> int:
-        """Return how many readings there are."""
-        return (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
-
-    def since(self, first: int) -> tuple[FloatArray, FloatArray]:
-        """Return positions (k, 3) and rotations (k, 3, 3) from reading `first` on."""
-        offset = _HEADER_BYTES + first * self._dtype.itemsize
-        rows = np.fromfile(self._path, self._dtype, count=self.count() - first, offset=offset)
-        return np.array(rows["position_m"]), np.array(rows["rotation"])
-
-
 class RigOperator(PoseOperator):
     """Operator of a simulated robot with a scanner.
 
@@ -107,7 +80,7 @@ class RigOperator(PoseOperator):
     """
 
     def __init__(
-        self, rig: LockstepRobot, scanner: ScannerTail, given: bool, stop: Callable[[], bool]
+        self, rig: LockstepRobot, scanner: RecordLog, given: bool, stop: Callable[[], bool]
     ) -> None:
         super().__init__(Robot(rig), rig.robot, self._see, stop)
         self.rig = rig
@@ -134,7 +107,7 @@ class RigOperator(PoseOperator):
     def wait(self, seconds: float) -> None:
         super().wait(0.5 * seconds)
         if self._standing is None:  # any motion left is too small for the scanner to see
-            self._standing = self._scanner.count()
+            self._standing = len(self._scanner)
         super().wait(0.5 * seconds)
 
     @override
@@ -145,14 +118,15 @@ class RigOperator(PoseOperator):
 
     def _scanned(self) -> tuple[FloatArray, float, FloatArray, float] | None:
         """Return the scanner's mean pose since the platform stopped, with standard deviations."""
-        position, rotation = self._scanner.since(self._standing or 0)
-        if not len(position):
+        rows, header = self._scanner.read(self._standing or 0), self._scanner.header
+        if not len(rows):
             return None
-        better = math.sqrt(len(position))
+        better = math.sqrt(len(rows))
         return (
-            *(position.mean(axis=0), self._scanner.position_std_m / better),
-            *(Rotation.from_matrix(rotation).mean().as_matrix(),),
-            self._scanner.rotation_std_rad / better,
+            rows["position_m"].mean(axis=0),
+            header["position_sigma_m"] / better,
+            Rotation.from_matrix(rows["rotation"]).mean().as_matrix(),
+            header["rotation_sigma_rad"] / better,
         )
 
     def outside(self) -> OutsidePose:
@@ -206,8 +180,9 @@ def simulated_rig(
                 as_calibrated=as_calibrated,
                 calibration_in_doubt=True,
             ) as rig,
+            RecordLog(path, SCANNER) as log,
         ):
-            operator = RigOperator(rig, ScannerTail(path), scanner, stop)
+            operator = RigOperator(rig, log, scanner, stop)
             try:
                 if camera is not None:
                     operator.camera = camera(f"sim:{socket}", rig.machine.clock)

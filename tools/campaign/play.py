@@ -25,7 +25,7 @@ from cdpr_tools.campaign.local_simulator import LocalSimulator
 from cdpr_tools.campaign.scenario import BEFORE_BOOT, READY, TIGHT, Action, Scenario
 from cdpr_tools.client.status_text import next_steps
 from cdpr_tools.lockstep_robot import LockstepRobot
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 
 _TIGHTEN_S: Final = 120.0
 _SETTLE_S: Final = 30.0

@@ -1,11 +1,14 @@
-"""Read the simulator's log of the true motion; only the report uses it."""
+"""Read the simulator's logs: a motor's true motion, a robot's true poses, a scanner's readings.
+
+Only reports, trials, tests and the comparison of a calibration with the truth use them.
+"""
 
 from __future__ import annotations
 
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,27 +21,92 @@ from cdpr_rt.identification.rawlog import RawLog
 from cdpr_tools.errors import BadInputError
 
 _HEADER_BYTES = 1024
-_FORMAT = "cdpr-rt truth log 1"
+TRUTH, POSES, SCANNER = "cdpr-rt truth log 1", "cdpr-rt pose log 1", "cdpr-rt scanner log 1"
+"""Formats of the logs."""
 NO_SYNC = 0xFFFFFFFF
 """SYNC number of a record that was made without a SYNC."""
 
+PoseRecords = NDArray[np.void]
+"""Records of a log of poses, (k,): `sync_index`, `time_s` (bus time), `position_m` (3,),
+`velocity_m_s` (3,), `rotation` (3, 3), `tension_N` (n,) and `motor_rad` (n,), all true at that
+time."""
+
+
+class RecordLog:
+    """A log that may still be written; its records can be read at any time.
+
+    Raises BadInputError if `path` is no log of this format.
+    """
+
+    def __init__(self, path: Path, form: str) -> None:
+        self.path = path
+        self._fd = -1
+        try:
+            self._fd = open_regular(path)
+            self.header: dict[str, Any] = parse_json(os.pread(self._fd, _HEADER_BYTES, 0), path)
+            fields = [
+                (name, kind, *map(tuple, rest)) for name, kind, *rest in self.header["fields"]
+            ]
+            self.dtype: np.dtype[Any] = np.dtype(fields)
+            if (self.header["format"], self.header["record_bytes"]) != (form, self.dtype.itemsize):
+                raise ValueError(self.header["format"])
+        except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
+            self.close()
+            raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
+
+    def __len__(self) -> int:
+        return max(0, os.fstat(self._fd).st_size - _HEADER_BYTES) // self.dtype.itemsize
+
+    def last(self) -> Any:
+        """Return the newest record, a scalar of `dtype`; raises BadInputError without one."""
+        count = len(self)
+        if not count:
+            raise BadInputError(f"{self.path}: holds no record yet")
+        return self.read(count - 1, count)[0]
+
+    def read(self, first: int = 0, last: int | None = None) -> PoseRecords:
+        """Return the records from `first` to before `last`, or fewer if the log is shorter."""
+        size = self.dtype.itemsize
+        last = len(self) if last is None else min(last, len(self))
+        parts, at, end = [], _HEADER_BYTES + first * size, _HEADER_BYTES + last * size
+        while at < end:
+            parts.append(os.pread(self._fd, end - at, at))
+            at += len(parts[-1])
+        return np.frombuffer(b"".join(parts), self.dtype)
+
+    def close(self) -> None:
+        """Close the file; safe to repeat."""
+        fd, self._fd = self._fd, -1
+        if fd >= 0:
+            os.close(fd)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def read_pose_log(path: Path, *, without_sync: bool = False) -> PoseRecords:
+    """Return the records of SYNCs or, if `without_sync`, also those without one (`NO_SYNC`).
+
+    Raises BadInputError if `path` is no such log.
+    """
+    with RecordLog(path, POSES) as log:
+        records = log.read()
+    return records if without_sync else records[records["sync_index"] != NO_SYNC]
+
 
 class Truth:
-    """The log of the true motion; only the needed records are read, because it may be long.
+    """The log of a motor's true motion; only the needed records are read, because it may be long.
 
     Raises BadInputError if `path` is no such log.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
-            with os.fdopen(open_regular(path), "rb") as file:
-                header = parse_json(file.read(_HEADER_BYTES), path)
-            self._dtype: np.dtype[Any] = np.dtype([(n, kind) for n, kind in header["fields"]])
-            if header["format"] != _FORMAT or header["record_bytes"] != self._dtype.itemsize:
-                raise ValueError(header["format"])
-        except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
-            raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
+        with RecordLog(path, TRUTH) as log:
+            self._dtype = log.dtype
         self._at_sync: NDArray[np.intp] = np.zeros(0, np.intp)
         """Numbers of the records made at a SYNC, among the first `_searched` records."""
         self._searched = 0

@@ -14,7 +14,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.service.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.recordings.pose_log import Truth, read_pose_log
+from cdpr_tools.recordings.truth import PoseRecords, read_pose_log
 from cdpr_tools.trials.directions import Directions, platform_of, rotations_of
 
 TRUTH: Final = "truth.log"
@@ -59,7 +59,9 @@ class Recorded:
         if cycle.size < 2 or not (np.diff(cycle) == 1).all():
             raise WorkFailedError(f"{folder}: the recording has gaps, or no cycles")
         self.first = int(cycle[0])
-        self.truth: Truth = _joined(read_pose_log(folder / TRUTH), cycle + begin["sync_offset"] - 1)
+        self.truth: PoseRecords = _joined(
+            read_pose_log(folder / TRUTH), cycle + begin["sync_offset"] - 1
+        )
         self._require_alignment()
 
     @property
@@ -154,7 +156,7 @@ def _read(paths: list[Path]) -> tuple[Columns, list[dict[str, Any]]]:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, marks
 
 
-def _joined(truth: Truth, index: NDArray[np.int64]) -> Truth:
+def _joined(truth: PoseRecords, index: NDArray[np.int64]) -> PoseRecords:
     """Return the records of the SYNCs `index`; raises WorkFailedError if some are missing."""
     first = int(truth["sync_index"][0]) if truth.size else 0
     rows = index.astype(np.int64) - first

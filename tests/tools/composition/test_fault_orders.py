@@ -12,7 +12,7 @@ from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.lockstep_robot import LockstepRobot
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 
 AXIS, LIMIT = 2, 10
 """Axis from 1, and the missed answers in a row that planar-3 bridges."""

@@ -12,7 +12,7 @@ from cdpr_rt.core.states import LoopState
 from cdpr_rt.robot import Error, Refused
 from cdpr_rt.service.stream_packet import Standing, StreamSession
 from cdpr_tools.lockstep_robot import LockstepRobot, StreamSender
-from cdpr_tools.recordings.pose_log import read_pose_log
+from cdpr_tools.recordings.truth import read_pose_log
 
 HEIGHT = 1.5
 
