@@ -21,7 +21,7 @@ from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.finish import concluded, stop_criterion
 from cdpr_tools.calibrate.measure_poses import PoseOperator
 from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted
-from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only
+from cdpr_tools.calibrate.run import DATA, POINTS, Ask, read_places, report_faults_only
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.output import Output
 
@@ -88,7 +88,7 @@ def calibrate(
             with out.stage("choosing poses"):
                 places, most = places_of(profile, count, listed, seed), count or MOST_POSES
             with daemon_run.going_on(kept):
-                daemon_run.read_places(
+                read_places(
                     *(out, profile, operator, kept, places, most),
                     criterion if count is None else report_faults_only(criterion),
                     _asking(operator, measured, measured_std_m, file),
@@ -121,9 +121,7 @@ def _poses_in(
     return daemon_run.DaemonPoses(where, data)
 
 
-def _asking(
-    operator: PoseOperator, measured: Measure | None, std_m: float, path: Path
-) -> daemon_run.Ask:
+def _asking(operator: PoseOperator, measured: Measure | None, std_m: float, path: Path) -> Ask:
     """Return a function that stores the measured position at a pose, counted from 1."""
     if measured is None:
         return lambda _pose: None

@@ -23,14 +23,13 @@ from cdpr_rt.core.clock import Clock
 from cdpr_tools.calibrate.daemon_run import (
     DaemonPoses,
     image_taker,
-    read_places,
     robot_of,
 )
 from cdpr_tools.calibrate.finish import identified, with_hand_eye
 from cdpr_tools.calibrate.measure_poses import PoseOperator, StoppedError
 from cdpr_tools.calibrate.places import chosen_places
 from cdpr_tools.calibrate.rig import simulated_rig
-from cdpr_tools.calibrate.run import DATA, no_poses
+from cdpr_tools.calibrate.run import DATA, no_poses, read_places
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, WorkFailedError

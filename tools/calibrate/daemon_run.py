@@ -8,12 +8,12 @@ import select
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from pydantic import Field
+from typing_extensions import override
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration_in_force import calibrated
@@ -27,13 +27,11 @@ from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, PoseReadi
 from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.calibrate import run
 from cdpr_tools.calibrate.measure_poses import (
-    Measured,
     PoseOperator,
     PoseRefusedError,
     TakeImage,
     read_pose,
 )
-from cdpr_tools.calibrate.places import Places
 from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -80,31 +78,13 @@ def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> R
     return robot
 
 
-@dataclass
-class DaemonPoses(run.StoredPoses):
-    """Poses of a robot that a daemon runs, in a folder; each is stored as soon as it is read."""
+class DaemonPoses(run.StoredPoses[PoseOperator]):
+    """Poses of a robot that a daemon runs."""
 
-    name: str = DATA
-    """Name of the file."""
-
-    def require_home(self, robot: Robot, place: FloatArray) -> None:
-        """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
-        platform = robot.platform
-        assert platform is not None  # see `robot_of`
-        k = len(platform.home_m)
-        off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
-        if not self.data.poses and off_m > platform.home_tolerance_m:
-            raise BadInputError(
-                f"the platform is {1e3 * off_m:.0f} mm from home, where the first pose must be; "
-                "run `cdpr lower` and `cdpr tighten`"
-            )
-
-    def add(self, reading: PoseReading, counted_m: FloatArray) -> None:
-        """Append a reading and store it; raises ProfileError.
-
-        `counted_m` (n,) are the lengths at which the motors' angles are zero.
-        """
+    @override
+    def add(self, reading: PoseReading, operator: PoseOperator) -> None:
         poses, restarts = self.data.poses, self.data.restarts
+        counted_m = operator.counted_m
         if poses:
             before = read_json_model(self.folder / COUNTED, CountedFrom).length_m
             if np.abs(np.array(before) - counted_m).max() > _COUNTS_ANEW_m:
@@ -119,10 +99,6 @@ class DaemonPoses(run.StoredPoses):
         # reading that counting has restarted
         write_text(self.folder / COUNTED, counted)
 
-    def save(self) -> None:
-        """Write the data; raises ProfileError."""
-        self.data.save(self.folder / self.name)
-
 
 def read_into(reader: PoseOperator, robot: Robot, kept: DaemonPoses) -> None:
     """Read the pose at which the robot stands, and keep it.
@@ -135,7 +111,7 @@ def read_into(reader: PoseOperator, robot: Robot, kept: DaemonPoses) -> None:
         reading = read_pose(reader, place)
     except PoseRefusedError as error:
         raise WorkFailedError(str(error)) from None
-    kept.add(reading, reader.counted_m)
+    kept.add(reading, reader)
 
 
 def data_of(folder: Path, robot: Robot, simulated: bool) -> CalibrationData:
@@ -238,51 +214,9 @@ def lines(robot: Robot, data: CalibrationData) -> list[str]:
     return said
 
 
-Ask = Callable[[int], None]
-"""Asks a person for the measured position at a pose, counted from 1."""
-
-
 def going_on(kept: DaemonPoses) -> AbstractContextManager[None]:
     """Add to any error of the block how to continue; see `saying_how_to_continue`."""
     return run.saying_how_to_continue(kept, "the same command continues after them")
-
-
-def read_places(
-    out: Output,
-    robot: Robot,
-    operator: PoseOperator,
-    kept: DaemonPoses,
-    places: Places,
-    most: int,
-    criterion: run.StopCriterion = lambda _data: None,
-    ask: Ask = lambda _pose: None,
-) -> None:
-    """Read home if there are no poses yet, then places until `most` or `criterion` is reached.
-
-    All readings are kept, even after an error. Raises CommandError, ControlError, DriverError, and
-    StoppedError if the user stops the run.
-    """
-    with out.progress(f"reading up to {most} poses", float(most)) as advance:
-        if not kept.data.poses:
-            read_into(operator, robot, kept)
-            ask(1)
-
-        def keep() -> None:
-            kept.add(measured.readings[-1], operator.counted_m)
-            advance(float(len(kept.data.poses)))
-            ask(len(kept.data.poses))
-
-        before = kept.data
-        measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
-        done = {reading.target for reading in before.poses} | set(before.tried)
-        try:
-            run.read_batches(
-                *(out, operator, places, most, measured, done), lambda: criterion(kept.data)
-            )
-        finally:
-            update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
-            kept.data = kept.data.model_copy(update=update)
-            kept.save()
 
 
 # Ask a person for the measured position while the platform stands; store it in a file of points.

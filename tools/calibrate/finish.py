@@ -14,6 +14,7 @@ from cdpr_profiles.calibration_in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.geometry_calibration import GeometryCalibration
 from cdpr_rt.calibration.calibrate import calibrate
+from cdpr_rt.calibration.marker_map import coverage
 from cdpr_rt.calibration.outcome import (
     CalibrationFiles,
     CalibrationMethod,
@@ -89,6 +90,12 @@ def stop_criterion(
     named: set[str] = set()
 
     def check(data: CalibrationData) -> str | None:
+        if data.camera is not None:
+            cover = coverage(data.sightings(), data.camera.sheets.placed)
+            for text in cover.lines():
+                out.note(f"after {len(data.poses)} poses: {text}")
+            if not any(len(island) > 1 for island in cover.islands):
+                raise WorkFailedError("no image shows two markers together; move them closer")
         if len(data.poses) < _LEAST_JUDGED:
             return None
         try:

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar, get_args
 
 import numpy as np
 from pydantic import Field, field_validator
+from typing_extensions import override
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import FileMissingError, ProfileError, brief
 from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
 from cdpr_profiles.reader import Profile, read_json_model
-from cdpr_rt.calibration.marker_map import coverage, listed
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.marker_map import listed
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings import (
     CalibrationData,
     CameraSetup,
     MeasuredPoint,
     Numbers,
+    PoseReading,
     load_data,
     load_points,
 )
@@ -48,7 +52,7 @@ from cdpr_tools.calibrate.places import (
 from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator, simulated_rig
 from cdpr_tools.calibrate.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
-from cdpr_tools.output import Advance, Output
+from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 
 if TYPE_CHECKING:
@@ -131,19 +135,50 @@ def no_poses(robot: Robot, simulated: bool, camera: CameraSetup | None = None) -
     )
 
 
+_Operator = TypeVar("_Operator", bound=PoseOperator)
+
+
 @dataclass
-class StoredPoses:
-    """Readings of a calibration in its folder."""
+class StoredPoses(ABC, Generic[_Operator]):
+    """Readings of a calibration in the files of its folder; they are complete after each pose."""
 
     folder: Path
     data: CalibrationData
+    name: str = DATA
+    """Name of the file of the data."""
+
+    @abstractmethod
+    def add(self, reading: PoseReading, operator: _Operator) -> None:
+        """Append a reading of this operator and store it; raises ProfileError."""
+
+    def save(self) -> None:
+        """Write the data; raises ProfileError."""
+        self.data.save(self.folder / self.name)
+
+    def done(self) -> set[tuple[float, ...]]:
+        """Return the targets (d,) that were read, or tried without success."""
+        return {reading.target for reading in self.data.poses} | set(self.data.tried)
+
+    def require_home(self, robot: Robot, place: FloatArray) -> None:
+        """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
+        platform = robot.platform
+        assert platform is not None  # callers have checked it
+        k = len(platform.home_m)
+        off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
+        if not self.data.poses and off_m > platform.home_tolerance_m:
+            raise BadInputError(
+                f"the platform is {1e3 * off_m:.0f} mm from home, where the first pose must be; "
+                "run `cdpr lower` and `cdpr tighten`"
+            )
 
 
 @dataclass
-class StoredRun(StoredPoses):
-    """Readings of a run, in the files of its folder; the files are complete after each pose."""
+class StoredRun(StoredPoses[RigOperator]):
+    """Readings of a run on a simulated robot, with its true and scanned poses."""
 
     outside: list[OutsidePose] = field(default_factory=list)
+    restarted: bool = False
+    """Whether lengths count from a new zero since the last reading."""
 
     @classmethod
     def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> StoredRun:
@@ -185,31 +220,31 @@ class StoredRun(StoredPoses):
         except FileMissingError:  # ended before the first pose
             outside = []
         # if the run was killed between the two files, drop a pose that is in only one of them
-        return cls(folder, data.model_copy(update={"poses": data.poses[: len(outside)]}), outside)
-
-    def done(self) -> set[tuple[float, ...]]:
-        """Return the targets (d,) that were read, or tried without success."""
-        return {reading.target for reading in self.data.poses} | set(self.data.tried)
+        data = data.model_copy(update={"poses": data.poses[: len(outside)]})
+        return cls(folder, data, outside=outside, restarted=bool(outside))
 
     def remaining(self, places: Listed | None) -> Listed | None:
         """Return the listed places (m, d) that were not tried yet; None without a list."""
         return None if places is None else tuple(one for one in places if one not in self.done())
 
-    def keep(self, measured: Measured, restarts: tuple[int, ...], outside: OutsidePose) -> None:
-        """Store all readings with a new pose; raises ProfileError."""
-        self.outside.append(outside)
-        OutsidePoses(poses=tuple(self.outside)).save(self.folder / OUTSIDE)
-        self.data = self.data.model_copy(
-            update={"poses": tuple(measured.readings), "restarts": restarts}
-        )
-        self.save(measured)
-
-    def save(self, measured: Measured) -> None:
-        """Store which places were refused and tried, but no new pose; raises ProfileError."""
-        self.data = self.data.model_copy(
-            update={"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
-        )
-        self.data.save(self.folder / DATA)
+    @override
+    def add(self, reading: PoseReading, operator: RigOperator) -> None:
+        poses, restarts = self.data.poses, self.data.restarts
+        outside = operator.outside()
+        try:
+            if longer_s := _scanned_s(len(poses)):
+                operator.wait(longer_s)
+                # a cable may slip or creep meanwhile: use the truth from when lengths were read
+                outside = operator.outside().with_truth_of(outside)
+        finally:  # the pose has been read, even if the wait fails
+            self.outside.append(outside)
+            OutsidePoses(poses=tuple(self.outside)).save(self.folder / OUTSIDE)
+            if self.restarted:
+                restarts += (len(poses),)
+                self.restarted = False
+            update = {"poses": (*poses, reading), "restarts": restarts}
+            self.data = self.data.model_copy(update=update)
+            self.save()
 
 
 def measure(
@@ -262,12 +297,15 @@ def measure(
                     stop=stop,
                 )
             )
-        up_to = "" if settings.poses else "up to "
-        advance = stack.enter_context(out.progress(f"reading {up_to}{most} poses", float(most)))
-        _Measuring(out, operator, kept, most, advance).go(
-            robot,
-            places,
+            home = operator.tighten()
+        count = len(kept.data.poses)
+        if count:
+            out.note(f"continuing after {count} poses; reading home again first")
+        operator.number = count + 1
+        read_places(
+            *(out, robot, operator, kept, places, most),
             criterion if settings.poses is None else report_faults_only(criterion),
+            home=home,
         )
     return kept.data
 
@@ -329,7 +367,7 @@ def truth_comparison_of_folder(
 
 
 @contextmanager
-def saying_how_to_continue(kept: StoredPoses, how: str) -> Iterator[None]:
+def saying_how_to_continue(kept: StoredPoses[Any], how: str) -> Iterator[None]:
     """Add to any error of the block what is saved, and `how` to continue.
 
     StoppedError becomes WorkFailedError.
@@ -350,23 +388,87 @@ def saying_how_to_continue(kept: StoredPoses, how: str) -> Iterator[None]:
         raise
 
 
-def read_batches(
+Ask = Callable[[int], None]
+"""Asks a person for the measured position at a pose, counted from 1."""
+
+
+def read_places(
     out: Output,
-    operator: PoseOperator,
+    robot: Robot,
+    operator: _Operator,
+    kept: StoredPoses[_Operator],
     places: Places,
     most: int,
-    measured: Measured,
-    done: Container[tuple[float, ...]],
-    enough: Callable[[], object],
+    criterion: StopCriterion = lambda _data: None,
+    ask: Ask = lambda _pose: None,
+    home: FloatArray | None = None,
 ) -> None:
-    """Read batches of places that are not `done`, until there are `most` poses or `enough`."""
-    for batch in places.batches():
-        left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-        left = left[: most - len(measured.readings)]
-        measure_poses(operator, left, places.middle, measured, out)
-        if len(measured.readings) >= most or (len(left) and enough()):
-            return
-    out.note(f"only {len(measured.readings)} poses: the robot refused all others")
+    """Read home, then batches of places until there are `most` poses, or `criterion` is met.
+
+    Home is read if there are no poses yet, or if it is given: the place (d,) where the platform
+    stands after a restart. All readings are kept, even after an error. Raises CommandError,
+    ControlError, DriverError, and StoppedError if the user stops the run.
+    """
+    with out.progress(f"reading up to {most} poses", float(most)) as advance:
+
+        def note_tried() -> None:
+            update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
+            kept.data = kept.data.model_copy(update=update)
+
+        def keep() -> None:
+            note_tried()
+            kept.add(measured.readings[-1], operator)
+            advance(float(len(kept.data.poses)))
+            ask(len(kept.data.poses))
+
+        before, done = kept.data, kept.done()
+        measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
+        try:
+            if home is not None or not before.poses:
+                _read_home(out, robot, operator, kept, measured, home)
+            for batch in places.batches():
+                left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+                left = left[: most - len(measured.readings)]
+                measure_poses(operator, left, places.middle, measured, out)
+                if len(measured.readings) >= most:
+                    return
+                if len(left) and (why := criterion(kept.data)) is not None:
+                    out.note(why)
+                    return
+            out.note(f"only {len(measured.readings)} poses: the robot refused all others")
+        finally:
+            if kept.data.poses:
+                note_tried()
+                kept.save()
+
+
+def _read_home(
+    out: Output,
+    robot: Robot,
+    operator: _Operator,
+    kept: StoredPoses[_Operator],
+    measured: Measured,
+    home: FloatArray | None,
+) -> None:
+    """Read home; report camera problems before the robot moves far. Raises WorkFailedError."""
+    if home is None:
+        home = operator.place()
+        kept.require_home(robot, home)
+    try:
+        measured.add(read_pose(operator, home))
+    except PoseRefusedError as error:
+        raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
+    seen, setup = kept.data.poses[-1].image, kept.data.camera
+    if seen is None or setup is None or seen.problem is not None:
+        return  # the image's problem is already reported; the next one may be better
+    if not seen.markers:
+        why = "was another dictionary printed, or are the sheets out of view?"
+        if seen.mirrored:
+            why = f"{listed(seen.mirrored)} are mirror images: are all printed like that?"
+        raise WorkFailedError(
+            f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
+        )
+    out.note(f"at home the camera sees {len(seen.markers)} markers")
 
 
 def _scanned_s(pose: int) -> float:
@@ -377,85 +479,6 @@ def _scanned_s(pose: int) -> float:
     if pose == 0:
         return _FIRST_S
     return _HELD_OUT_S if every_fifth(pose + 1)[pose] else 0.0
-
-
-class _Measuring:
-    """Measures the poses with a robot that stands ready at home."""
-
-    def __init__(
-        self, out: Output, operator: RigOperator, kept: StoredRun, most: int, advance: Advance
-    ) -> None:
-        self._out, self._operator, self._kept = out, operator, kept
-        self._most, self._advance = most, advance
-        before = kept.data
-        self._restarts = before.restarts
-        if before.poses:
-            self._restarts += (len(before.poses),)
-            out.note(f"continuing after {len(before.poses)} poses; reading home again first")
-        self._measured = Measured(
-            self._keep, list(before.poses), list(before.left_out), list(before.tried)
-        )
-        operator.number = len(before.poses) + 1
-
-    def _keep(self) -> None:
-        operator, count = self._operator, len(self._measured.readings)
-        outside = operator.outside()
-        try:
-            if longer_s := _scanned_s(count - 1):
-                operator.wait(longer_s)
-                # a cable may slip or creep meanwhile: use the truth from when lengths were read
-                outside = operator.outside().with_truth_of(outside)
-        finally:  # the pose has been read, even if the wait fails
-            self._kept.keep(self._measured, self._restarts, outside)
-        self._advance(float(count))
-
-    def go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
-        """Read home, then batches of places until there are enough."""
-        try:
-            self._go(robot, places, criterion)
-        finally:
-            if self._kept.data.poses:
-                self._kept.save(self._measured)
-
-    def _go(self, robot: Robot, places: Places, criterion: StopCriterion) -> None:
-        operator, measured, done = self._operator, self._measured, self._kept.done()
-        try:
-            measured.add(read_pose(operator, operator.tighten()))
-        except PoseRefusedError as error:
-            raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
-        self._look_at_home()
-        read_batches(
-            *(self._out, operator, places, self._most, measured, done),
-            lambda: self._judged(criterion),
-        )
-
-    def _look_at_home(self) -> None:
-        """Report camera problems before the robot moves far; raises WorkFailedError."""
-        seen, setup = self._measured.readings[-1].image, self._kept.data.camera
-        if seen is None or setup is None or seen.problem is not None:
-            return  # the image's problem is already reported; the next one may be better
-        if not seen.markers:
-            why = "was another dictionary printed, or are the sheets out of view?"
-            if seen.mirrored:
-                why = f"{listed(seen.mirrored)} are mirror images: are all printed like that?"
-            raise WorkFailedError(
-                f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
-            )
-        self._out.note(f"at home the camera sees {len(seen.markers)} markers")
-
-    def _judged(self, criterion: StopCriterion) -> bool:
-        """Report how good the poses so far are; return whether no more are needed."""
-        data = self._kept.data
-        if data.camera is not None:
-            cover = coverage(data.sightings(), data.camera.sheets.placed)
-            for text in cover.lines():
-                self._out.note(f"after {len(data.poses)} poses: {text}")
-            if not any(len(island) > 1 for island in cover.islands):
-                raise WorkFailedError("no image shows two markers together; move them closer")
-        why = criterion(data)
-        if why is not None:
-            self._out.note(why)
-        return why is not None
 
 
 # Check the options of a run before anything moves.

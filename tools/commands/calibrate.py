@@ -183,7 +183,7 @@ def measure(
         from cdpr_tools.calibrate.finish import concluded, finish, stop_criterion, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measure_poses import PoseOperator  # noqa: PLC0415
         from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
-        from cdpr_tools.calibrate.run import DATA, POINTS, report_faults_only  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.run import DATA, POINTS, read_places, report_faults_only  # noqa: PLC0415  # slow to load
         from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
 
@@ -213,7 +213,7 @@ def measure(
         home_m = platform_of(robot).home_m
         asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
         criterion = stop_criterion(out, robot, points if ask else None, geometry)
-        daemon_run.read_places(
+        read_places(
             out, robot, operator, kept, places, most,
             criterion if count is None else report_faults_only(criterion),
             asked or (lambda _pose: None),

@@ -21,6 +21,7 @@ from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, load_data
 from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import TripError
 from cdpr_tools.calibrate import run
+from cdpr_tools.calibrate.finish import stop_criterion
 from cdpr_tools.calibrate.measure_poses import (
     SETTLE_S,
     NotThePoseError,
@@ -279,14 +280,14 @@ def test_a_read_pose_is_kept_if_the_longer_scan_is_interrupted(
     tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = rigs()
-    told = run.StoredRun.keep
+    told = run.StoredRun.add
 
-    def keep(self: run.StoredRun, *what: Any) -> None:
+    def add(self: run.StoredRun, *what: Any) -> None:
         told(self, *what)
         if len(self.data.poses) == 4:
             made[0].trip = TripError("the motion was ended: fault")
 
-    monkeypatch.setattr(run.StoredRun, "keep", keep)
+    monkeypatch.setattr(run.StoredRun, "add", add)
     with pytest.raises(TripError, match="ended"):
         begin(tmp_path, settings())
     left = load_data(tmp_path / run.DATA)
@@ -349,6 +350,18 @@ def test_a_camera_that_sees_no_marker_at_home_ends_the_run(
     with pytest.raises(WorkFailedError, match="at home the camera sees no marker"):
         begin(tmp_path, settings())
     assert not made[0].gone
+
+
+def test_images_that_never_show_two_markers_end_the_run_after_a_batch(
+    tmp_path: Path, rigs: Callable[..., list[Rig]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rigs()
+    monkeypatch.setattr(Rig, "image", lambda _: Sighting("now", {0: np.zeros((4, 2))}))
+    kept = run.StoredRun.new(tmp_path, ROBOT, SETUP)
+    criterion = stop_criterion(Output(True), ROBOT, None, CableGeometry.of(ROBOT))
+    with pytest.raises(WorkFailedError, match="no image shows two markers together"):
+        run.measure(Output(True), ROBOT, settings(), kept, criterion)
+    assert len(load_data(tmp_path / run.DATA).poses) == 11  # home and ten places
 
 
 def test_a_new_run_deletes_poses_of_the_previous_run(

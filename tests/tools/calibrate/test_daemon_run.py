@@ -20,9 +20,10 @@ from cdpr_rt.errors import TripError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.check import checked_running
-from cdpr_tools.calibrate.daemon_run import going_on, read_places
+from cdpr_tools.calibrate.daemon_run import going_on
 from cdpr_tools.calibrate.measure_poses import PoseOperator
 from cdpr_tools.calibrate.places import Places
+from cdpr_tools.calibrate.run import read_places
 from cdpr_tools.client.client import ConnectionLostError
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.refusals import DaemonRefusalError
