@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 import time
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
 from cdpr_rt.motion.way_points import read_source, require_kind
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.robot import Faulted, MotionEnded, Robot, end_text
-from cdpr_tools.client.client import Daemon, await_start
+from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.motion import LOOK_S, carry_out, finish, require_platform
 from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
 from cdpr_tools.client.status_text import CONTINUE, left_text, next_steps
@@ -23,43 +22,39 @@ from cdpr_tools.signals import stop_on_signals
 _MOST_BYTES: Final = 1 << 20
 _NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_. -]")
 _NAME_CHARS: Final = 48
-Opened = AbstractContextManager[Daemon]
-"""What `open_daemon` returns."""
 BACK: Final = "`cdpr path back MM` steps back"
 
 
 def follow(
-    opened: Opened, out: Output, file: Path, options: PathOptions, feed: float | None
+    daemon: Daemon, out: Output, file: Path, options: PathOptions, feed: float | None
 ) -> None:
     """Let the daemon plan the path of a file and follow it to its end; `feed` is at most 1."""
-    options.require_use(file)
     body = {**path_source(file), **options.request()}
-    with opened as daemon:
-        _require_platform(daemon, out)
-        require_held(daemon.get("/status"))
-        with out.stage(f"{file.name}: planning"):
-            planned = _planned(daemon, body, daemon.post("/path", body)["number"])
-        for notice in planned.get("notices", ()):
-            out.note(f"{file.name}: {notice}")
-        duration_s, lasts = 0.0, True
-        while lasts:
-            lasts_text = time_text(planned["duration_s"])
-            out.say(f"{file.name}: {planned['length_m']:.3f} m in {lasts_text}")
-            arguments = {"plan": planned["plan"]} | _feed(feed)
-            duration_s += planned["duration_s"]
-            line = planned.get("next_line")
-            if line is None:
-                _run(daemon, out, arguments, planned_s=duration_s)
-                return
-            # a path that needs several plans: plan the next one while this one is followed
-            body["line"] = line
-            number = daemon.post("/path", body)["number"]
-            rest = f"`cdpr path run {file} --line {line}`"
-            later = f"the path from line {line} on is still to do; next: {rest}"
-            lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
-            if lasts:
-                out.note(f"{file.name}: continues with line {line}")
-                planned = _planned(daemon, body, number)
+    require_platform(daemon.get("/description"), "path")
+    require_held(daemon.get("/status"))
+    with out.stage(f"{file.name}: planning"):
+        planned = _planned(daemon, body, daemon.post("/path", body)["number"])
+    for notice in planned.get("notices", ()):
+        out.note(f"{file.name}: {notice}")
+    duration_s, lasts = 0.0, True
+    while lasts:
+        lasts_text = time_text(planned["duration_s"])
+        out.say(f"{file.name}: {planned['length_m']:.3f} m in {lasts_text}")
+        arguments = {"plan": planned["plan"]} | _feed(feed)
+        duration_s += planned["duration_s"]
+        line = planned.get("next_line")
+        if line is None:
+            _run(daemon, out, arguments, planned_s=duration_s)
+            return
+        # a path that needs several plans: plan the next one while this one is followed
+        body["line"] = line
+        number = daemon.post("/path", body)["number"]
+        rest = f"`cdpr path run {file} --line {line}`"
+        later = f"the path from line {line} on is still to do; next: {rest}"
+        lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
+        if lasts:
+            out.note(f"{file.name}: continues with line {line}")
+            planned = _planned(daemon, body, number)
 
 
 def path_source(file: Path) -> dict[str, str]:
@@ -74,12 +69,13 @@ def plain_name(file: Path) -> str:
     return f"{stem or 'path'}{suffix}"
 
 
-def resume_path(opened: Opened, out: Output, back_mm: float | None, feed: float | None) -> None:
+def resume_path(
+    daemon: Daemon, out: Output, feed: float | None = None, back_mm: float | None = None
+) -> None:
     """Continue the interrupted path, or move back along it; by default at its last feed."""
-    with opened as daemon:
-        _require_platform(daemon, out)
-        where = {"resume": True} if back_mm is None else {"back_m": 1e-3 * back_mm}
-        _run(daemon, out, where | _feed(feed))
+    require_platform(daemon.get("/description"), "path")
+    where = {"resume": True} if back_mm is None else {"back_m": 1e-3 * back_mm}
+    _run(daemon, out, where | _feed(feed))
 
 
 def _feed(feed: float | None) -> dict[str, Any]:
@@ -101,16 +97,6 @@ def _planned(daemon: Daemon, body: dict[str, Any], number: int) -> dict[str, Any
     if job["error"]:
         raise BadInputError(str(job["error"]))
     return job
-
-
-def go_on(daemon: Daemon, out: Output) -> None:
-    """Continue a paused path at its feed."""
-    _run(daemon, out, {"resume": True})
-
-
-def _require_platform(daemon: Daemon, out: Output) -> None:
-    await_start(daemon, out)
-    require_platform(daemon.get("/description"), "path")
 
 
 def require_held(status: dict[str, Any]) -> None:

@@ -392,9 +392,9 @@ def lower(
 def resume(daemon: Daemon, out: Output) -> None:
     """Continue the move or path that was stopped by `cdpr hold` or Ctrl-C."""
     if (daemon.get("/status").get("program_progress") or {}).get("path"):
-        from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
+        from cdpr_tools.client.path_following import resume_path  # noqa: PLC0415  # slow to load
 
-        go_on(daemon, out)
+        resume_path(daemon, out)
         return
     _require_platform(daemon, "resume")
     with in_typed_words("resume", instead="cdpr move --to"):

@@ -14,6 +14,7 @@ from typing_extensions import override
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration_in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
+from cdpr_tools.client.client import Daemon, await_start, open_daemon
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -26,6 +27,7 @@ from cdpr_tools.commands.options import (
     shares,
     written_as,
 )
+from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, CommandError, os_error_as
 from cdpr_tools.output import Output
 
@@ -176,46 +178,35 @@ def run(
 
     Ctrl-C holds the platform on the path. Exit with status 2 if the robot cannot follow the path.
     """
-    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
-    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.path_following import follow  # noqa: PLC0415  # slow to load
 
-    opened = open_daemon(robot, socket, url, key_file)
-    following.follow(opened, out, path.file, path.options, _share(feed))
+    path.options.require_use(path.file)
+    with open_daemon(robot, socket, url, key_file) as daemon:
+        await_start(daemon, out)
+        follow(daemon, out, path.file, path.options, _share(feed))
 
 
 @app.command()
-def resume(
-    feed: FeedOption = None,
-    robot: RobotOption = None,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
-    as_json: JsonOption = False,
-) -> None:
+@with_daemon
+def resume(daemon: Daemon, out: Output, feed: FeedOption = None) -> None:
     """Continue an interrupted path from where it stopped."""
-    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
-    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.path_following import resume_path  # noqa: PLC0415  # slow to load
 
-    opened = open_daemon(robot, socket, url, key_file)
-    following.resume_path(opened, Output(as_json), None, _share(feed))
+    resume_path(daemon, out, _share(feed))
 
 
 @app.command()
+@with_daemon
 def back(
+    daemon: Daemon,
+    out: Output,
     distance: Annotated[float, argument("How far, in mm along the path.", min=0.1, metavar="MM")],
     feed: FeedOption = None,
-    robot: RobotOption = None,
-    socket: SocketOption = None,
-    url: UrlOption = None,
-    key_file: KeyFileOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Go back a step along an interrupted path, and hold there."""
-    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
-    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.path_following import resume_path  # noqa: PLC0415  # slow to load
 
-    opened = open_daemon(robot, socket, url, key_file)
-    following.resume_path(opened, Output(as_json), distance, _share(feed))
+    resume_path(daemon, out, _share(feed), distance)
 
 
 def _share(percent: float | None) -> float | None:
@@ -227,8 +218,6 @@ def robot_by_name(name: str) -> Robot:
 
     Raises ProfileError.
     """
-    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
-
     try:
         return load_calibrated(name)
     except ProfileError:
