@@ -1,4 +1,4 @@
-"""One simulated motor with its inner loops: the compiled step and a plain wrapper object."""
+"""One simulated motor with its inner loops: its compiled step and its feedback."""
 
 from __future__ import annotations
 
@@ -14,12 +14,7 @@ from cdpr_sim_bus.robot.motor_state import (
     CREEPS,
     DELAY_SLOTS,
     LINE_COUNTS,
-    MotorArray,
-    MotorRatings,
-    Transmission,
-    build_motor,
 )
-from cdpr_sim_bus.robot.plant import Plant
 
 # Physics of one motor: current loop, cogging, LuGre friction, rotor, encoder disc (compiled).
 
@@ -395,23 +390,3 @@ def run(
         m.time = until
         flags |= servo.watch(m, kind, target, dt)
     return sample_of(motor, flags)
-
-
-class Motor:
-    """A motor without a drive: its power stage acts immediately and detects no fault."""
-
-    def __init__(
-        self,
-        plant: Plant,
-        ratings: MotorRatings | None = None,
-        transmission: Transmission | None = None,
-    ) -> None:
-        self.ratings = ratings or MotorRatings()
-        self.plant = plant
-        self.record: MotorArray = build_motor(plant, self.ratings, transmission)
-        self.time_s = 0.0
-
-    def step(self, dt_s: float, kind: int, target: float) -> Sample:
-        """Advance by `dt_s` seconds; `kind` and `target` as named in `cdpr_sim_bus.robot.servo`."""
-        self.time_s += dt_s
-        return Sample(*run(self.record, self.time_s, kind, target))

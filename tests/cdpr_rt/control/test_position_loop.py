@@ -19,9 +19,9 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.programs.model import position_loop
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.motor_state import MotorRatings
 from cdpr_sim_bus.robot.plant import LoadPlant, Plant
+from tests.sim_bus.robot.bare_motor import Motor
 from tests.tools.motor_profiles import profile_of
 
 WINCH, PERIOD_S, RAMP_S = "winch-mpp0923d", 1e-3, 0.5

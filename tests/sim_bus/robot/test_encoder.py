@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from cdpr_sim_bus.robot import motor as motor_physics
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.plant import Plant
+from tests.sim_bus.robot.bare_motor import Motor
 
 TRUE = {"eccentricity_rad": 0.0, "interpolation_error": 0.0}
 """An encoder without errors."""

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from cdpr_profiles.errors import ProfileError
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
 from tests.sim_bus.cia402.drive_rig import Rig
+from tests.sim_bus.robot.bare_motor import Motor
 from tests.sim_bus.robot.plant_torques import friction_Nm
 
 GAIN = 0.026

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from cdpr_sim_bus.robot import servo
-from cdpr_sim_bus.robot.motor import Motor, Sample
+from cdpr_sim_bus.robot.motor import Sample
 from cdpr_sim_bus.robot.plant import Plant
+from tests.sim_bus.robot.bare_motor import Motor
 from tests.sim_bus.robot.plant_torques import cogging_Nm, friction_Nm
 
 COLD = {"cogging_per_K": 0.0, "friction_per_K": 0.0}
