@@ -127,7 +127,6 @@ _REACTION_S: Final = 120.0
 _ANGLES: Final = ("angle", "rx", "ry", "rz")
 _STANDING: Final = ("hold", "idle")
 _STANDS: Final = ("the path waits here", "stepped back")
-_AXIS_PROGRAMS: Final = ("jog", "pid", "sweep")
 _NEXT: Final = {
     "ready": "call enable() first",
     "fault": "remove its cause, then call acknowledge() and enable()",
@@ -598,7 +597,7 @@ class Robot:
         with _HeldOnError(self):
             while not is_done(progress := self._running(program)):
                 self._backend.wait(self._backend.look_s)
-            if program in _AXIS_PROGRAMS:
+            if program == "jog" or not self._k:  # it moves single axes
                 self._settle(program)
         self._started = ""
         if (trouble := progress.get("trouble")) and self.on_status is None:
