@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
 from pathlib import Path
 from typing import Any, Final
 
-from cdpr_profiles.bounded_input import read_json
+from cdpr_profiles.bounded_input import read_json, replacing
 from cdpr_profiles.errors import FileMissingError, ProfileError
 from cdpr_profiles.user_folders import state_folder
 from cdpr_rt.errors import ControlError
@@ -61,19 +60,13 @@ def write_state(path: Path, state: dict[str, Any]) -> None:
 
     Raises StateFileError.
     """
-    fresh = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
         make_private_folder(path.parent)
-        fresh.unlink(missing_ok=True)
-        fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
-        with os.fdopen(fd, "w", encoding="utf-8") as file:
-            file.write(json.dumps(state, indent=1) + "\n")
+        with replacing(path, FILE_MODE) as file:
+            file.write(json.dumps(state, indent=1).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
-        fresh.replace(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            fresh.unlink(missing_ok=True)
         raise StateFileError(f"{path}: cannot be written: {error.strerror}") from error
 
 

@@ -164,15 +164,17 @@ def may_replace(path: Path, mark: bytes | None = None) -> bool:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
+def replacing(path: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
     """Yield a new file, which replaces `path` as a whole if the block ends without an exception.
 
-    The new file is in the folder of `path` and has an unused name, so that no user file is lost.
+    The new file is in the folder of `path` and has an unused name, so that no user file is lost;
+    `mode` are its permissions, before the umask.
     Raises OSError.
     """
     fresh = path.with_name(f".cdpr-{secrets.token_hex(8)}.part")
     try:
-        with fresh.open("xb") as file:
+        fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+        with os.fdopen(fd, "wb") as file:
             yield file
         fresh.replace(path)
     finally:

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 import mmap
-import os
 import platform
 import struct
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from enum import Enum, IntFlag
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
+from cdpr_profiles.bounded_input import replacing
 from cdpr_sim_bus.errors import BusSetupError
 
 _T = TypeVar("_T")
@@ -298,18 +297,15 @@ class PhysicsBoard:
         path = Path(path)
         if path.exists():
             cls.attach(path).close()  # replace the board of a killed simulator, but no other file
-        fresh = path.with_name(f".{path.name}.{os.getpid()}")
         words = bytearray(8 * _WORDS * (1 + axes))
         _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS, lockstep)
         for axis in range(axes):
             start = 8 * _WORDS * (1 + axis)
             struct.pack_into("<4d", words, start + 8 * _POWER_FROM, *_ALWAYS, *_ALWAYS)
         try:
-            fresh.write_bytes(words)
-            fresh.replace(path)
+            with replacing(path) as file:
+                file.write(words)
         except OSError as error:
-            with suppress(OSError):
-                fresh.unlink()
             raise BusSetupError(f"physics board {path}: {error.strerror}") from None
         board = cls.attach(path)
         board._owned = True

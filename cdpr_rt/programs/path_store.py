@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_profiles.bounded_input import open_regular, read_bytes
+from cdpr_profiles.bounded_input import open_regular, read_bytes, replacing
 from cdpr_profiles.errors import FileMissingError, ProfileError
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import PATH
@@ -365,13 +365,10 @@ def write_plan(
         )
     name = hashlib.sha256(data).hexdigest()[:32]
     path = folder / f"{name}.path"
-    fresh = path.with_suffix(f".{os.getpid()}.new")
     try:
         make_private_folder(folder)
-        fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, FILE_MODE)
-        with os.fdopen(fd, "wb") as file:
+        with replacing(path, FILE_MODE) as file:
             file.write(data)
-        fresh.replace(path)
         left = [_left_on(folder, simulated=simulated) for simulated in (False, True)]
         plans = sorted(folder.glob("*.path"), key=lambda one: one.stat().st_mtime)
         for old in plans[:-_KEPT]:

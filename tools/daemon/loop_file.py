@@ -12,7 +12,6 @@ import os
 import select
 import signal
 import stat
-import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -20,9 +19,10 @@ from typing import Annotated, Final, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from cdpr_profiles.bounded_input import open_regular, parse_json
+from cdpr_profiles.bounded_input import open_regular, parse_json, replacing
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_rt.loop.stop_socket import STOP_SUFFIX
+from cdpr_rt.state_file import FILE_MODE
 from cdpr_tools.command_group import ROBOT_VARIABLE
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
@@ -66,14 +66,8 @@ class LoopFile(BaseModel):
 
     def write(self, path: Path) -> None:
         """Write the file, for this user only, completely or not at all. Raises OSError."""
-        fd, fresh = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # mode 0600
-        try:
-            with os.fdopen(fd, "w") as file:
-                file.write(self.model_dump_json())
-            Path(fresh).replace(path)
-        except OSError:
-            Path(fresh).unlink()
-            raise
+        with replacing(path, FILE_MODE) as file:
+            file.write(self.model_dump_json().encode())
 
     def remove(self, path: Path) -> None:
         """Remove the file, and the socket left by a killed loop, unless they are another's."""

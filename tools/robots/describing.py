@@ -16,6 +16,7 @@ import numpy as np
 from cdpr_drivers.bus.budget import machine_budget
 from cdpr_drivers.robot.robot_buses import refusal
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.bounded_input import replacing
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.places import SHIPPED, profile_files, user_folder
 from cdpr_profiles.user_folders import can_write
@@ -184,18 +185,11 @@ def _saved(answers: Answers, form: _Form, name: str, *, replace: bool) -> dict[s
         raise BadInputError(f"name {name!r}: a shipped robot has it; choose another")
     path = _file(name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, encoding="utf-8", delete=False) as file:
-        file.write(text_of(answers))
-    written = Path(file.name)
     try:
-        if replace:
-            written.replace(path)
-        else:
-            path.hardlink_to(written)
+        with replacing(path) if replace else path.open("xb") as file:
+            file.write(text_of(answers).encode())
     except FileExistsError:
         raise BadInputError(f"{path}: already exists; confirm that it is to be replaced") from None
-    finally:
-        written.unlink(missing_ok=True)
     return {"file": str(path)}
 
 
