@@ -84,7 +84,7 @@ def _loaded(point: Any) -> Any:
 # Code that a robot's file names runs only if the user has allowed this content of this file.
 
 
-def require_allowed(reference: str, folder: Path, *, allow: bool = False) -> None:
+def require_allowed(reference: str, folder: Path, *, allow: bool) -> None:
     """Raise CodeError unless the user has allowed the code of "FILE.py:NAME".
 
     FILE is relative to `folder`. `allow` permits the code from now on, as long as the file does not
@@ -93,12 +93,12 @@ def require_allowed(reference: str, folder: Path, *, allow: bool = False) -> Non
     _allowed_source(reference, folder, allow=allow)
 
 
-def load_allowed(reference: str, folder: Path, *, allow: bool = False) -> Any:
+def load_allowed(reference: str, folder: Path) -> Any:
     """Load the object at "FILE.py:NAME" as `load_code` does, from the allowed bytes only.
 
     Raises CodeError if the user has not allowed the file's content, see `require_allowed`.
     """
-    file, source = _allowed_source(reference, folder, allow=allow)
+    file, source = _allowed_source(reference, folder, allow=False)
     try:
         return _member(_run(file, source), reference.rpartition(":")[2])
     except (Exception, SystemExit) as error:

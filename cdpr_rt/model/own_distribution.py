@@ -171,18 +171,17 @@ class OwnDistribution:
 # The distribution that a robot's file names, if it is not built in.
 
 
-def named_distribution(robot: Robot, *, allow_code: bool = False) -> TensionDistribution | None:
+def named_distribution(robot: Robot) -> TensionDistribution | None:
     """Return the distribution that the robot's file names; None if it is a built-in one.
 
-    This runs the code of a file only if the user has allowed it, or if `allow_code`. Raises
-    ProfileError.
+    This runs the code of a file only if the user has allowed it. Raises ProfileError.
     """
     own = "" if robot.platform is None else robot.platform.own_distribution
     if not own:
         return None
     try:
         if ":" in own:
-            found = load_allowed(own, robot.path.parent, allow=allow_code)
+            found = load_allowed(own, robot.path.parent)
         else:
             found = load_registered_one(DISTRIBUTIONS, own)
         return checked_distribution(own, found)
@@ -190,7 +189,7 @@ def named_distribution(robot: Robot, *, allow_code: bool = False) -> TensionDist
         raise _refused(robot, error) from error
 
 
-def require_code_allowed(robot: Robot, *, allow_code: bool = False) -> None:
+def require_code_allowed(robot: Robot, *, allow_code: bool) -> None:
     """Raise ProfileError if the robot's file names code that the user has not allowed.
 
     `allow_code` allows it from now on. No code runs.

@@ -94,7 +94,8 @@ def test_a_file_runs_only_with_the_content_that_was_allowed(tmp_path: Path) -> N
     file.write_text(source.replace("value = 1", "value = 2"))
     with pytest.raises(CodeError, match="has changed since you allowed it"):
         load_allowed("mine.py:value", tmp_path)
-    assert load_allowed("mine.py:value", tmp_path, allow=True) == 2
+    require_allowed("mine.py:value", tmp_path, allow=True)
+    assert load_allowed("mine.py:value", tmp_path) == 2
     (tmp_path / "copy.py").write_bytes(file.read_bytes())
     with pytest.raises(CodeError, match=r"copy\.py is code that would run with your rights; read"):
         load_allowed("copy.py:value", tmp_path)
