@@ -1,4 +1,4 @@
-"""Kernels of n cables on a platform with six directions: lengths, directions, wrenches.
+"""Kernels of n cables that may stretch and sag: lengths, directions, wrenches on a platform.
 
 Tremblay (thesis), eqs. (3.1) to (3.14), in m and rad. A twist is the velocity of the platform's
 origin and its angular velocity, both along the axes of the room; a small change of pose likewise.
@@ -14,7 +14,6 @@ Arrays, all of float64:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -198,20 +197,6 @@ def compare(
 
 _MOST_ITERATIONS = 100
 _SOLVED = 1e-14
-
-
-@dataclass(frozen=True)
-class CableModel:
-    """Stiffness EA and weight of the cables, from which the unstretched length is computed.
-
-    Without both, a cable is straight and rigid. With a stiffness it is straight and elastic; with a
-    weight it is an elastic catenary. The part on a pulley has the same strain and no weight.
-    """
-
-    stiffness_N: float = math.inf
-    """EA, the ratio of tension to strain."""
-    weight_N_m: float = 0.0
-    """Weight per unstretched length."""
 
 
 @jit

@@ -14,7 +14,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.jit import bound
 from cdpr_rt.model import cable_kernel, pose_search
-from cdpr_rt.model.cable_kernel import CableModel, write_unstretched_lengths
+from cdpr_rt.model.cable_kernel import write_unstretched_lengths
 from cdpr_rt.model.pose import Pose
 
 PLANAR_POINT = (0, 1)
@@ -39,7 +39,7 @@ class PoseSolution:
 
 
 class CableKinematics:
-    """Lengths and Jacobian of n straight, elastic or sagging cables; pose from their lengths.
+    """Lengths and Jacobian of n straight cables; pose from their lengths.
 
     Eqs. (3.1) to (3.15) for positions and rotations, with the lengths of all cables, as compiled
     kernels over (6, n). The methods write into arrays of the object and allocate nothing if `out`
@@ -52,7 +52,6 @@ class CableKinematics:
         anchor_points_m: FloatArray,
         directions: Sequence[int] = SPATIAL,
         *,
-        model: CableModel | None = None,
         pulley_radius_m: FloatArray | float = 0.0,
         swivel_axes: FloatArray | None = None,
         weights_N_m: FloatArray | float = 0.0,
@@ -68,7 +67,6 @@ class CableKinematics:
         """
         a, b = _points(exit_points_m), _points(anchor_points_m)
         self.n, self.directions = len(a), tuple(directions)
-        self.model = model or CableModel()
         self._up = np.eye(3)[np.shape(exit_points_m)[1] - 1]
         self.geometry = np.zeros((cable_kernel.GEOMETRY_ROWS, self.n))
         """Array `geometry` of `cable_kernel`; `solver` is that of `pose_search`."""
@@ -105,21 +103,18 @@ class CableKinematics:
         in_space, free = bool(self._up[2]), len(self.directions) < len(SPATIAL)
         return in_space and free and self.n < len(SPATIAL) and bool(np.ptp(anchors, axis=1).any())
 
-    def lengths(self, pose: Pose, tension_N: FloatArray | None = None) -> FloatArray:
-        """Return the unstretched lengths (n,) of cables with tensions `tension_N` (n,) at `pose`.
+    def lengths(self, pose: Pose) -> FloatArray:
+        """Return the lengths (n,) of straight cables without tension at `pose`.
 
-        Tensions apply at the platform; by default they are 0. A length on a pulley begins at the
-        point at which the cable comes in. Raises GeometryError if an anchor is in its exit point or
-        pulley, or if the tension is too low for the cable to carry its own weight.
+        A length on a pulley begins at the point at which the cable comes in. Raises GeometryError
+        if an anchor is in its exit point or pulley.
         """
         self._run(pose)
-        rho = np.empty(self.n)
-        self._unstretch(self._no_tension if tension_N is None else tension_N, rho)
-        if not np.isfinite(rho).all():
-            i = int(np.argmin(np.isfinite(rho)))
-            raise GeometryError(
-                f"cable {i + 1}: the given tension is too low to carry its own weight"
-            )
+        cables, rho = self._cables, np.empty(self.n)
+        write_unstretched_lengths(
+            cables[:3], cables[cable_kernel.FREE], cables[cable_kernel.ARC], self._up,
+            self._no_tension, 0.0, 0.0, rho,
+        )  # fmt: skip
         return rho
 
     def jacobian(self, pose: Pose) -> FloatArray:
@@ -262,13 +257,6 @@ class CableKinematics:
         if not self._cables[cable_kernel.FREE].min() > 0.0:
             i = int(np.argmin(self._cables[cable_kernel.FREE] > 0.0))
             raise GeometryError(f"cable {i + 1}: its anchor point lies in its exit point or pulley")
-
-    def _unstretch(self, tension_N: FloatArray, rho: FloatArray) -> None:
-        cables = self._cables
-        write_unstretched_lengths(
-            cables[:3], cables[cable_kernel.FREE], cables[cable_kernel.ARC], self._up, tension_N,
-            1.0 / self.model.stiffness_N, self.model.weight_N_m, rho,
-        )  # fmt: skip
 
 
 def _points(given: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A group of CiA 402 axes on one bus, exchanged once per cycle as arrays."""
+"""A group of CiA 402 axes on one bus, exchanged once per cycle as arrays, and their faults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One simulated motor with its inner loops: its compiled step and its feedback."""
+"""One simulated motor: its current, cogging, friction, rotor, cable and encoder, in one step."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry
 from cdpr_rt.calibration.readings import Observations
-from cdpr_rt.model.cable_kernel import CABLE_ROWS, CableModel, run_poses
+from cdpr_rt.model.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses, write_unstretched_lengths
 from cdpr_rt.model.kinematics import CableKinematics
 from cdpr_rt.model.platform_model import PlatformModel
 from cdpr_rt.model.pose import Pose
@@ -64,10 +64,7 @@ def made_up(
     tension = rng.uniform(model.low_N, model.high_N, (poses, n))
     exits, anchors = true.kernel_geometry()[:3].T, true.kernel_geometry()[3:6].T
     soft = float(true.compliance()[0])
-    truly = CableKinematics(
-        exits, anchors, model.kinematics.directions,
-        model=CableModel(1.0 / soft if soft else np.inf, float(file.weight_N_m[0])),
-    )  # fmt: skip
+    geometry = CableKinematics(exits, anchors).geometry
     lengths, told = np.zeros((2, poses, n))
     held, up = [], file.coordinates - 1
     for j, array in enumerate(model.poses(places)):
@@ -80,7 +77,12 @@ def made_up(
         if in_balance:
             tension[j] = _holding(true, pose, tension[j])
         held.append(pose)
-        lengths[j] = truly.lengths(pose, tension[j])
+        cables = np.empty((1, CABLE_ROWS, n))
+        run_poses(geometry, pose.array[None], cables)
+        write_unstretched_lengths(
+            cables[0, :3], cables[0, FREE], cables[0, ARC], np.eye(3)[up], tension[j], soft,
+            float(file.weight_N_m[0]), lengths[j],
+        )  # fmt: skip
         # tension at the winch exceeds that at the platform by the weight of the cable between
         height = (exits - pose.p - anchors @ pose.Q.T)[:, up]
         told[j] = tension[j] + file.weight_N_m * height

@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.model.cable_kernel import CableModel
 from cdpr_rt.model.kinematics import (
     PLANAR,
     PLANAR_POINT,
@@ -225,16 +224,6 @@ def test_an_anchor_point_in_its_exit_point_or_pulley_is_rejected() -> None:
         robot = CableKinematics(a, np.tile([off, 0.0, 0.0], (8, 1)), pulley_radius_m=radius)
         with pytest.raises(GeometryError, match="cable 3: its anchor point"):
             robot.jacobian(Pose(a[2]))
-
-
-def test_a_cable_that_cannot_carry_its_weight_is_reported() -> None:
-    robot = CableKinematics(
-        SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m, model=CableModel(40e3, 0.122)
-    )
-    with pytest.raises(
-        GeometryError, match="cable 1: the given tension is too low to carry its own weight"
-    ):
-        robot.lengths(SPATIAL_8.home)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.05])
