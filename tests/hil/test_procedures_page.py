@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import test_operators_page as page_rig
 from daemon_rig import RealDaemon, until
+from test_operators_page import playwright_api, press
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
 
-_CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(_CHROMIUM is None, reason="no Chromium is installed (package chromium)"),
-]
-playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+pytestmark = page_rig.pytestmark
+browser = page_rig.browser
 _PATIENCE_ms = 240e3
 _VIEWS = ("commission", "calibrate", "describe")
 
@@ -43,15 +39,6 @@ def daemon(home: Path) -> Iterator[RealDaemon]:
         assert made.end() == 0, made.errors()
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[playwright_api.Browser]:
-    arguments = ["--no-sandbox", "--disable-background-networking", "--disable-3d-apis"]
-    with playwright_api.sync_playwright() as api:
-        browser = api.chromium.launch(executable_path=_CHROMIUM, args=arguments)
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
 def page(daemon: RealDaemon, browser: playwright_api.Browser) -> Iterator[playwright_api.Page]:
     """Open the page; errors on its console fail the test."""
@@ -71,10 +58,6 @@ def page(daemon: RealDaemon, browser: playwright_api.Browser) -> Iterator[playwr
 
 def show(page: playwright_api.Page, view: str) -> None:
     page.get_by_role("navigation").get_by_role("link", name=view, exact=True).click()
-
-
-def press(page: playwright_api.Page, name: str) -> None:
-    page.get_by_role("button", name=name, exact=True).click()
 
 
 def test_a_motor_is_commissioned_and_its_report_opens(
@@ -177,16 +160,10 @@ def test_a_robot_is_described_diagnosed_and_saved(page: playwright_api.Page, hom
     page.get_by_text("It can work").wait_for()
 
 
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1400), ("dark", 390)])
-def test_the_views_are_accessible(page: playwright_api.Page, scheme: str, width: int) -> None:
-    page.emulate_media(color_scheme=scheme)
-    page.set_viewport_size({"width": width, "height": 844})
+def test_the_views_are_accessible(page: playwright_api.Page) -> None:
     for view in _VIEWS:
         show(page, view.capitalize())
         page.get_by_role("main").get_by_role("heading", level=2).first.wait_for()
         if view == "describe":
             page.get_by_role("combobox", name="Kind of robot").wait_for()
-        # a link of the navigation that is scrolled out of sight skips nothing
-        options = {"rules": {"skip-link": {"enabled": False}}}
-        found = axe.Axe().run(page, options=options).response["violations"]
-        assert [(view, one["id"], one["nodes"][0]["html"]) for one in found] == []
+        page_rig.assert_accessible(page)

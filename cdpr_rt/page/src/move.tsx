@@ -21,6 +21,14 @@ export function useHindrance(): string {
   return status.control.held && !right.held ? `${status.control.client} has the right to move.` : "";
 }
 
+export const OUTSIDE = "The platform is outside its box of targets, as at home. Enter a target in the box and press Go; then it can move by steps.";
+
+/** Whether the platform is so far outside its box of targets that no step of this size leads into it. */
+export function isOutside({ workspace_min_m: low_m, workspace_max_m: high_m }: Platform, step_m: number): boolean {
+  const position_m = (store.status && progressOf(store.status).position_m) ?? [];
+  return position_m.some((one, axis) => one + step_m < low_m[axis]! || one - step_m > high_m[axis]!);
+}
+
 /** A card of actions that are disabled, with the reason, while this page may not move the robot. */
 export function Moving({ name, title, children }: { name: string; title: string; children: ComponentChildren }) {
   const hindrance = useHindrance();
@@ -128,6 +136,7 @@ function Jog({ platform }: { platform: Platform }) {
   const [size, setSize] = useState(1);
   const [frame, setFrame] = useState<"room" | "platform">("room");
   const names = positionsOf(platform), turns = anglesOf(platform);
+  const outside = isOutside(platform, STEPS_MM[size]! / 1e3);
   const jog = (key: "distance_m" | "turn_rad", count: number, number: number, step: number): void => {
     const wanted = Array.from({ length: count }, (_, one) => (one === number ? step : 0));
     void store.attempt(() => store.right.program("pose", { [key]: wanted, frame }));
@@ -149,10 +158,12 @@ function Jog({ platform }: { platform: Platform }) {
           <option value="room">the room's axes</option><option value="platform">the platform's axes</option>
         </select></label>
       </div>
-      <div class="row">
+      {outside && <p class="quiet">{OUTSIDE}</p>}
+      <fieldset class="row" disabled={outside}>
+        <legend class="hidden">Steps</legend>
         {names.map((name, number) => pair(name, "distance_m", names.length, number, STEPS_MM[size]! / 1e3, `${STEPS_MM[size]} mm`))}
         {turns.map((name, number) => pair(name, "turn_rad", turns.length, number, STEPS_DEG[size]! * RAD, `${STEPS_DEG[size]} deg`))}
-      </div>
+      </fieldset>
     </div>
   );
 }

@@ -116,7 +116,8 @@ function faultOf(status: Status): Situation {
 
 function readyOf(status: Status): Situation {
   const { fallen, broken } = lastStop(status);
-  const words = [status.reason];
+  const [, who] = /^disable by (.*)$/.exec(status.commanded ?? "") ?? [];
+  const words = [who ? `${who} has switched the power off` : status.reason];
   if (broken.length) words.push("Repair the cable before you enable");
   else if (fallen) words.push("The platform has come down: look at it before you enable");
   return situation("ready", "No power", words.filter(Boolean).join(". ") || "The drives are ready. Keep clear of the robot", "enable");
@@ -137,7 +138,8 @@ function activeOf(status: Status, description: Description | null): Situation {
   if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
     return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);
   }
-  const detail = progress.trouble || status.failure || status.reason;
+  const isLost = /right to move/.test(status.reason);
+  const detail = progress.trouble || status.failure || (isLost ? "The page or program that led the last motion no longer has the right to move. The robot holds" : status.reason);
   return situation("on", description?.platform ? "Holding the platform" : "Holding", detail, "move");
 }
 

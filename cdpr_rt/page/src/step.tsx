@@ -1,7 +1,7 @@
 // A step of one axis, commanded from the scope, which then shows its figures.
 import { useEffect, useState } from "preact/hooks";
 import type { Description } from "./daemon";
-import { positionsOf, useHindrance } from "./move";
+import { OUTSIDE, isOutside, positionsOf, useHindrance } from "./move";
 import { progressOf } from "./situation";
 import { store, useStore } from "./store";
 
@@ -51,8 +51,8 @@ export function Step({ description, shown, show, finished }: {
   const [from_s, begin] = useState<number | null>(null);
   const axis = axes.find((one) => one.name === name) ?? axes[0]!;
   const sizes = SIZES[axis.unit], size = sizes[place] ?? sizes[0]!;
-  const platformHindrance = useHindrance();
-  const hindrance = description.platform ? platformHindrance : status?.state === "active" ? "" : "The motor can turn once the power is on.";
+  const platform = description.platform, platformHindrance = useHindrance();
+  const hindrance = platform ? platformHindrance || (isOutside(platform, size / 1e3) ? OUTSIDE : "") : status?.state === "active" ? "" : "The motor can turn once the power is on.";
   const isReady = axis.ids.every((id) => shown.includes(id));
   const step = (sign: number): void => void store.attempt(async () => {
     const at_s = now_s();
