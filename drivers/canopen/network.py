@@ -449,18 +449,17 @@ class CanNetwork(BusMember):
             )
         return value
 
-    def read_bytes(self, node_id: int, index: int, sub: int = 0, *, block: bool = False) -> bytes:
+    def read_bytes(self, node_id: int, index: int, sub: int = 0) -> bytes:
         """Return an object's raw data, even if the EDS does not have the object.
 
-        With `block`, use block transfer if the node can: it is several times faster for long
-        data. Raises SdoError, BusError.
+        Raises SdoError, BusError.
         """
         return self._transfer(
             node_id,
             index,
             sub,
             "read",
-            lambda client: client.upload(index, sub, TIMEOUT_S, block=block),
+            lambda client: client.upload(index, sub, TIMEOUT_S),
             ATTEMPTS,
         )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from binascii import crc_hqx
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,15 +16,13 @@ from cdpr_rt.core.clock import Clock, TaskCancelled
 REQUEST: Final = 0x600
 ANSWER: Final = 0x580
 """Base identifiers of requests and answers, to which the node id is added."""
-UPLOAD, DOWNLOAD, BLOCK_UPLOAD = 2, 3, 6
+UPLOAD, DOWNLOAD = 2, 3
 """Meaning of the top three bits of an answer to the first request."""
 
 ABORT: Final = 0x80
 """First byte of a frame that ends a transfer."""
 # abort codes
 TIMED_OUT: Final = 0x05040000
-UNKNOWN_COMMAND: Final = 0x05040001
-CRC: Final = 0x05040004
 OUT_OF_MEMORY: Final = 0x05040005
 LENGTH: Final = 0x06070010
 NO_SUBINDEX: Final = 0x06090011
@@ -77,8 +74,6 @@ def segment(frame: bytes) -> tuple[bytes, bool]:
 Send = Callable[[bytes], None]
 Accept = Callable[[bytes], bool]
 
-_END = struct.Struct("<BH")
-_BLOCK_SEGMENTS = 127
 _MOST_WAITING = 1024
 """Maximum number of frames kept for a transfer, so that a flood cannot fill the memory."""
 _MOST_BYTES = 1 << 18
@@ -133,20 +128,26 @@ class SdoClient:
         """End transfers immediately, now and later, because the bus is gone."""
         self._lost = error
 
-    def upload(self, index: int, sub: int, timeout_s: float, *, block: bool = False) -> bytes:
-        """Return the data of an object; `timeout_s` applies to each answer.
-
-        With `block` a node may answer with many segments at a time; if it cannot, it is read in
-        single segments.
-        """
+    def upload(self, index: int, sub: int, timeout_s: float) -> bytes:
+        """Return the data of an object; `timeout_s` applies to each answer."""
         with self._transfer(index, sub, timeout_s):
-            if block:
-                try:
-                    return self._block_upload()
-                except SdoAbortError as error:
-                    if error.code != UNKNOWN_COMMAND:
-                        raise
-            return self._plain_upload(self._initiate(0x40, bytes(4), UPLOAD))
+            answer = self._initiate(0x40, bytes(4), UPLOAD)
+            value = expedited(answer)
+            if value is not None:
+                return value
+            size = int.from_bytes(answer[4:8], "little") if answer[0] & 0x01 else None
+            data = bytearray()
+            toggle = 0
+            for _ in range(self._most_bytes // 7):
+                frame = self._ask(bytes([0x60 | toggle << 4]), _segment(0, toggle))
+                part, last = segment(frame)
+                data += part
+                if size is not None and (len(data) > size or (last and len(data) < size)):
+                    self._abort(LENGTH)
+                if last:
+                    return bytes(data)
+                toggle ^= 1
+            return self._abort(OUT_OF_MEMORY)
 
     def download(self, index: int, sub: int, data: bytes, timeout_s: float) -> None:
         """Write the data of an object, expedited up to 4 bytes, else in segments."""
@@ -164,69 +165,6 @@ class SdoClient:
                 command = toggle << 4 | (7 - len(part)) << 1 | last
                 self._ask(bytes([command]) + part, _segment(1, toggle))
                 toggle ^= 1
-
-    # -- the kinds of upload
-
-    def _plain_upload(self, answer: bytes) -> bytes:
-        value = expedited(answer)
-        if value is not None:
-            return value
-        size = int.from_bytes(answer[4:8], "little") if answer[0] & 0x01 else None
-        data = bytearray()
-        toggle = 0
-        for _ in range(self._most_bytes // 7):
-            frame = self._ask(bytes([0x60 | toggle << 4]), _segment(0, toggle))
-            part, last = segment(frame)
-            data += part
-            if size is not None and (len(data) > size or (last and len(data) < size)):
-                self._abort(LENGTH)
-            if last:
-                return bytes(data)
-            toggle ^= 1
-        return self._abort(OUT_OF_MEMORY)
-
-    def _block_upload(self) -> bytes:
-        answer = self._initiate(0xA4, bytes([_BLOCK_SEGMENTS]), BLOCK_UPLOAD, UPLOAD)
-        if answer[0] >> 5 == UPLOAD:
-            return self._plain_upload(answer)
-        checked = bool(answer[0] & 0x04)
-        data = bytearray()
-        request = b"\xa3"
-        last = False
-        while not last:
-            if len(data) > self._most_bytes:
-                self._abort(OUT_OF_MEMORY)
-            self._request(request)
-            in_order, last = self._block(data)
-            request = bytes([0xA2, in_order, _BLOCK_SEGMENTS])
-        end = self._ask(request, lambda frame: frame[0] & 0xE3 == 0xC1)
-        command, checksum = _END.unpack_from(end)
-        del data[len(data) - (command >> 2 & 0x07) :]
-        if checked and crc_hqx(data, 0) != checksum:
-            self._abort(CRC)
-        self._request(b"\xa1")
-        return bytes(data)
-
-    def _block(self, data: bytearray) -> tuple[int, bool]:
-        """Process the segments of a block; return how many came in order, and whether the last did.
-
-        Segments after a lost one are discarded: the node sends them again.
-        """
-        in_order = 0
-        while True:
-            frame = self._next(self._clock.now_s + self._timeout_s)
-            if frame is None:
-                if not in_order:
-                    self._time_out()
-                return in_order, False
-            number, last = frame[0] & 0x7F, bool(frame[0] & 0x80)
-            if number == in_order + 1:
-                in_order = number
-                data += frame[1:]
-                if last:
-                    return in_order, True
-            if last or number == _BLOCK_SEGMENTS:
-                return in_order, False
 
     # -- requests and answers
 

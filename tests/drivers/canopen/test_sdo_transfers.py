@@ -44,50 +44,6 @@ def test_data_of_any_length_are_read_as_written(network: CanNetwork) -> None:
         data = bytes((7 * k + size) & 0xFF for k in range(size))
         network.write_bytes(1, 0x2F10, 0, data)
         assert network.read_bytes(1, 0x2F10) == data
-        assert network.read_bytes(1, 0x2F10, block=True) == data
-
-
-def test_a_node_without_block_transfer_is_read_in_segments(network: CanNetwork, bus: str) -> None:
-    text = b"a name of more than seven letters"
-
-    def answer(request: bytes) -> list[bytes]:
-        if request[0] >> 5 == 5:
-            return [abort(request, 0x05040001)]
-        if request[0] == 0x40:
-            answer.at = 0  # type: ignore[attr-defined]
-            return [b"\x41" + request[1:4] + struct.pack("<I", len(text))]
-        at: int = answer.at  # type: ignore[attr-defined]
-        part = text[at : at + 7]
-        answer.at = at + 7  # type: ignore[attr-defined]
-        last = at + 7 >= len(text)
-        return [bytes([request[0] & 0x10 | (7 - len(part)) << 1 | last]) + part]
-
-    with scripted(bus, SCRIPTED, answer):
-        assert network.read_bytes(SCRIPTED, 0x1008, block=True) == text
-
-
-def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str) -> None:
-    data = bytes(range(70))
-    segments = [bytes([k + 1]) + data[7 * k : 7 * k + 7] for k in range(10)]
-    segments[9] = bytes([10 | 0x80]) + segments[9][1:]
-    acknowledged: list[int] = []
-
-    def answer(request: bytes) -> list[bytes]:
-        kind = request[0] & 0x03
-        if kind == 0:
-            return [b"\xc2" + request[1:4] + struct.pack("<I", len(data))]
-        if kind == 3:
-            return segments[:4] + segments[5:]  # the fifth is lost
-        if kind == 2:
-            acknowledged.append(request[1])
-            if len(acknowledged) == 1:
-                return [bytes([k + 1 | s[0] & 0x80]) + s[1:] for k, s in enumerate(segments[4:])]
-            return [b"\xc1"]
-        return []
-
-    with scripted(bus, SCRIPTED, answer):
-        assert network.read_bytes(SCRIPTED, 0x1008, block=True) == data
-    assert acknowledged == [4, 6]
 
 
 # -- abort codes
