@@ -26,7 +26,7 @@ from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
 from cdpr_tools.output import Output, TableText
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.calibration_text import calibration_lines
-from cdpr_tools.robots.caspr import ModelAnswers, read_caspr
+from cdpr_tools.robots.caspr import read_caspr
 from cdpr_tools.robots.questions import KINDS, SKETCH, Default, Question
 from cdpr_tools.streams import discard_typed_ahead
 
@@ -202,14 +202,14 @@ def import_(
     """Write a robot's file from a CASPR model.
 
     Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
-    The platform's origin is its centre of mass. The plane of a planar robot is vertical, with y
-    upward. If the robot cannot work with its winches, the file
-    is written anyway, and you can edit it.
+    The platform's origin is its centre of mass. The plane of a planar robot becomes
+    vertical. If the robot cannot work with its winches, the file is written anyway, and you can
+    edit it.
     """
     out = Output(as_json)
     _require_new(path)
     given = _given(answers or ())
-    ask = ModelAnswers(read_caspr(bodies, cables))
+    ask = read_caspr(bodies, cables)
     complete = new_robot.answers_of(path, given, ask, out.stage)
     for note in ask.notes:
         out.say(f"not from the model: {note}")

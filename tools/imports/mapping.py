@@ -46,7 +46,7 @@ class Column(Profile):
         unit = self.unit or table.units.get(self.name, next(iter(units)))
         if unit not in units:
             allowed = ", ".join(units)
-            problem = f"column {self.name!r} has the unit {unit!r}; allowed: {allowed}"
+            problem = f"column {self.name!r} has the unit {unit!r}; allowed as `unit`: {allowed}"
             raise ProfileError(table.path, "", problem)
         if self.sign == 0:
             raise ProfileError(

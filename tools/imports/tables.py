@@ -305,24 +305,31 @@ def _head(rows: Iterator[_Row]) -> list[list[str]]:
 def _read_optitrack(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     """Read an export of OptiTrack Motive: columns such as "Platform Position X".
 
-    Names stand above the line "Frame,Time (Seconds),...": a line `Name` and, directly above the
-    axes, one with Rotation or Position. The first line states the unit of length.
+    Names stand above the line "Frame,Time (Seconds),...": a line `Name`, which exports before
+    version 1.23 do not mark, and, directly above the axes, one with Rotation or Position. The first
+    line states the unit of length.
     """
     head = _head(rows)
-    named = [row for row in head if "Name" in row[:2]]
-    if not named:
+    filled = [row for row in head[1:] if any(row)]
+    marked = [i for i, row in enumerate(filled) if "Name" in row[:2]]
+    at = marked[0] if marked else 1
+    if not marked and len(filled) != len(("types", "names", "IDs", "kinds", "axes")):
         raise ProfileError(
             path, "", "no lines `Name` and `Frame`: export from Motive with all header rows"
         )
-    bodies, kinds, axes = named[0], head[-2], head[-1]
-    names, units = [], {}
+    types, bodies, kinds, axes = filled[at - 1], filled[at], filled[-2], filled[-1]
+    names: list[str] = []
+    units = {}
     facts = dict(zip(head[0][::2], head[0][1::2], strict=False))
-    stated = facts.get("Length Units", "Meters")
-    length, kind = _LENGTHS.get(stated.lower(), stated), facts.get("Rotation Type", _QUATERNION)
+    stated = facts.get("Length Units", "not stated")
+    length = _LENGTHS.get(stated.lower(), stated)
+    kind = facts.get("Rotation Type", _QUATERNION if "W" in axes else "order not stated")
     faults: dict[str, ProfileError] = {}
     for j, axis in enumerate(axes):
         above = [part[j] for part in (bodies, kinds) if j > 1 and j < len(part) and part[j]]
-        name = " ".join([*above, axis]) if j > 1 else (TIME if j == 1 else axis)
+        name = " ".join([*above, axis]).strip() if j > 1 else (TIME if j == 1 else axis)
+        if name in names:  # a marker of a body, measured and as fitted
+            name += f" ({types[j]})"
         names.append(name)
         if "Position" in above:
             units[name] = length

@@ -17,27 +17,31 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.robots.questions import KINDS, Default, Question
 
-_PLANAR: Final = ("PLANAR_XY", "P_XY")
+_PLANES: Final = {"XY": [0, 1], "XZ": [0, 2], "YZ": [1, 2]}
+"""Coordinates of planar joints, such as PLANAR_XZ or P_XZ; the second one becomes the height."""
 _LEAST_SHARE: Final = 0.01
 """Ratio of least to greatest tension, for models whose cables may be slack."""
 _MOST_BYTES: Final = 1 << 20
 
 
-def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
+def read_caspr(bodies: Path, cables: Path) -> ModelAnswers:
     """Return answers from a model with one rigid body; the platform's origin is its centre of mass.
 
-    The plane of a planar robot counts as vertical, y upward. If there are several sets of cables,
-    the model's default set is used. Raises BadInputError that names the file and the element.
+    The plane of a planar robot becomes vertical. In CASPR gravity acts along -z, so the plane of x
+    and y is horizontal there, which a note says. If there are several sets of cables, the model's
+    default set is used. Raises BadInputError that names the file and the element.
     """
     links = _root(bodies, "bodies_system").findall("links/*")
     if len(links) != 1:
         raise BadInputError(f"{bodies}: links: {len(links)} bodies; allowed: one, the platform")
     link = links[0]
     joint = _found(link, "joint", bodies).get("type", "")
-    size = 2 if joint in _PLANAR else 3
-    if size == 3 and not joint.startswith(("SPATIAL", "P_XYZ")):
+    plane = joint.removeprefix("PLANAR_").removeprefix("P_")
+    kept = _PLANES.get(plane, [0, 1, 2])
+    if len(kept) == 3 and not joint.startswith(("SPATIAL", "P_XYZ")):
         raise BadInputError(
-            f"{bodies}: joint: type {joint!r}; allowed: {', '.join(_PLANAR)}, P_XYZ, SPATIAL_..."
+            f"{bodies}: joint: type {joint!r}; allowed: PLANAR_XY, P_XY, or another plane, P_XYZ, "
+            "SPATIAL_..."
         )
     room_m = _point(link, "parent/location", bodies)
     centre_m = _point(link, "physical/com_location", bodies)
@@ -47,7 +51,8 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
         ends = cable.findall("attachments/attachment")
         if [_text(end, "link", cables) for end in ends] != ["0", "1"]:
             raise BadInputError(
-                f"{cables}: {cable.get('name')}: attachments; allowed: from link 0 to link 1"
+                f"{cables}: {cable.get('name')}: attachments; allowed: two <attachment>, of "
+                "link 0 and link 1; pulleys are not read"
             )
         on_frame, on_platform = (_point(end, "location", cables) for end in ends)
         of_origin = cable.get("attachment_reference") != "com"
@@ -62,9 +67,11 @@ def read_caspr(bodies: Path, cables: Path) -> dict[str, str]:
     answers["tension_min_N"] = f"{max(least_N, _LEAST_SHARE * most_N):g}"
     for name, points in (("exit", exits), ("anchor", anchors)):
         for number, point in enumerate(points, start=1):
-            answers[f"{name}_{number}_m"] = ", ".join(f"{x:.6g}" for x in point[:size])
-    kind = kind_of_points(np.array(exits)[:, :size], np.array(anchors), cables)
-    return {"kind": kind, **answers}
+            answers[f"{name}_{number}_m"] = ", ".join(f"{x:.6g}" for x in point[kept])
+    kind = kind_of_points(np.array(exits)[:, kept], np.array(anchors)[:, kept], cables)
+    is_flat = plane == "XY"
+    note = "gravity: the model's plane is horizontal; this robot's is vertical, with y upward"
+    return ModelAnswers({"kind": kind, **answers}, [note] * is_flat)
 
 
 class ModelAnswers:
@@ -73,9 +80,9 @@ class ModelAnswers:
     `notes` says which values of the model were not used, and why.
     """
 
-    def __init__(self, model: dict[str, str]) -> None:
+    def __init__(self, model: dict[str, str], notes: list[str]) -> None:
         self._model = model
-        self.notes: list[str] = []
+        self.notes = notes
 
     def __call__(self, question: Question, default: Default, problem: str) -> str:
         """Return the answer to a question."""

@@ -137,7 +137,11 @@ def test_other_recordings_are_compared_for_each_method(
     ("spoil", "changes", "text"),
     [
         (None, {"angle": 'angle = { name = "x" }'}, "no column 'x'; its columns: t, phi, iq"),
-        (None, {"angle": 'angle = { name = "phi", unit = "m" }'}, "unit 'm'; allowed: rad, deg"),
+        (
+            None,
+            {"angle": 'angle = { name = "phi", unit = "m" }'},
+            "unit 'm'; allowed as `unit`: rad, deg",
+        ),
         (("1.0;2.0;3.0", "1.0;2,5;3.0"), {}, "line 4: phi: value '2,5': earlier numbers have '.'"),
         (("\n1", "\n0"), {}, "line 4: t: the time does not increase: 0.000000 s, then 0.000000"),
         (("1.0;2.0;3.0", "1.0;2.0;3.0;4.0"), {}, "line 4: 4 cells; allowed: up to 3"),

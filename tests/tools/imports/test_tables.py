@@ -56,6 +56,28 @@ def test_an_optitrack_export_has_columns_by_body_and_axis(tmp_path: Path) -> Non
     assert table.units["Platform Position X"] == "mm"
 
 
+def test_an_optitrack_export_of_an_old_version_is_read_without_guessing(tmp_path: Path) -> None:
+    facts = OPTITRACK.splitlines()[0]
+    text = OPTITRACK.replace(",Name,", ",,").replace("Time (Seconds)", "Time")
+    table = read_table(written(tmp_path, text))
+    assert table.column("Platform Position X")[0] == 1.5
+    assert table.units["Platform Position X"] == "mm"
+    old = text.replace(facts, "Format Version,1.22,Take Name,Take 1").replace(",W,", ",,")
+    table = read_table(written(tmp_path, old))
+    assert table.units["Platform Position X"] == "not stated"
+    with pytest.raises(ProfileError, match=r"has Euler angles \(order not stated\)"):
+        table.column("Platform Rotation X")
+
+
+def test_markers_of_an_optitrack_export_may_occur_twice(tmp_path: Path) -> None:
+    lines = OPTITRACK.splitlines()
+    more = ("", "", ",Marker", ",Platform", ",2", ",Position", ",X", ",7", ",7", ",7")
+    text = "\n".join(line + end for line, end in zip(lines, more, strict=True)) + "\n"
+    table = read_table(written(tmp_path, text))
+    assert table.column("Platform Position X")[0] == 1.5
+    assert table.column("Platform Position X (Marker)")[0] == 7.0
+
+
 def test_other_units_and_euler_angles_of_an_optitrack_export_are_not_misread(
     tmp_path: Path,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,21 @@ def test_geometry_and_mass_come_from_the_model(tmp_path: Path) -> None:
     assert robot.platform.anchor_points_m[0] == pytest.approx((-0.12, 0.11))
     assert robot.limits.tension_max_N == (120.0,)
     assert robot.limits.tension_min_N == pytest.approx((1.2,))
+
+
+def test_a_horizontal_plane_is_noted_and_a_vertical_one_keeps_its_height(tmp_path: Path) -> None:
+    *_, output, path = imported(tmp_path)
+    assert "the model's plane is horizontal" in output
+    platform = load_robot(path).platform
+    path.unlink()
+    # x y 0 becomes x 0 y
+    bodies, given = BODIES.replace("XY", "XZ"), cables()
+    bodies = re.sub(r"(\S+) (\S+) 0(</(com_)?location>)", r"\1 0 \2\3", bodies)
+    given = re.sub(r"(\S+) (\S+) 0(</location>)", r"\1 0 \2\3", given)
+    status, output, path = imported(tmp_path, bodies, given)
+    assert status == 0, output
+    assert "plane is horizontal" not in output
+    assert load_robot(path).platform == platform
 
 
 def test_attachments_may_refer_to_the_centre_of_mass(tmp_path: Path) -> None:
