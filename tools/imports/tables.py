@@ -15,7 +15,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from itertools import chain, islice, takewhile, zip_longest
+from itertools import chain, dropwhile, islice, takewhile, zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -33,6 +33,8 @@ _DELIMITERS: Final = (",", ";", "\t")
 _SAMPLE_LINES: Final = 50
 _OPTITRACK: Final = "Format Version"
 _VICON: Final = ("Objects", "Segments", "Trajectories", "Joints", "Model Outputs")
+_QUALISYS: Final = "NO_OF_FRAMES"
+_QUALISYS_FACT: Final = re.compile(r"[A-Z]+(_[A-Z]+)*")
 TIME: Final = "time_s"
 """Name of the column with the time in formats that contain frame numbers instead."""
 _NUMBER_FIRST: Final = re.compile(r"[\"']?\s*[-+]?[.,]?[0-9]")
@@ -98,6 +100,8 @@ def read_table(path: Path) -> Table:
         return _read_optitrack(path, rows, digest)
     if first.rstrip(",;") in _VICON:
         return _read_vicon(path, rows, digest)
+    if first.startswith(_QUALISYS):
+        return _read_qualisys(path, rows, digest)
     return _read_csv(path, rows, digest, _last_comment(data, encoding))
 
 
@@ -367,3 +371,25 @@ def _read_vicon(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     seconds = (table.columns["Frame"] - 1.0) / rate
     columns = {TIME: seconds, **table.columns}
     return replace(table, columns=columns, units=units | {TIME: "s"})
+
+
+def _read_qualisys(path: Path, rows: Iterator[_Row], digest: str) -> Table:
+    """Read an export of Qualisys Track Manager: columns such as "Platform X", in mm.
+
+    Lines of facts such as FREQUENCY stand above the names. Only the first name of a body contains
+    the body.
+    """
+    rows = dropwhile(lambda row: len(row[1][0]) > 1 and _QUALISYS_FACT.fullmatch(row[1][0]), rows)
+    line, head = next(rows, (0, []))
+    if "Time" not in head:
+        problem = "no line of names with `Time`; export with column headers and time"
+        raise ProfileError(path, f"line {line}" if line else "", problem)
+    names, units, body = [], {TIME: "s"}, ""
+    for cell in head:
+        *above, axis = cell.rsplit(" ", 1)
+        body = above[0] if above else body
+        name = TIME if cell == "Time" else f"{body} {axis}".strip()
+        names.append(name)
+        if axis in ("X", "Y", "Z"):
+            units[name] = "mm"
+    return _table(path, digest, names, rows, units)
