@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from cdpr_here import cdpr_here
 
-from cdpr_profiles.places import SHIPPED
 from cdpr_rt.calibration.readings import load_data
+from tests.slower_robot import slower_robot
 
 _PLANT = """
 [geometry]
@@ -55,10 +55,7 @@ def test_a_killed_run_resumes_reports_a_slip_and_its_calibration_can_be_checked(
     fine.write_text(_PLANT.format(drum=0.0))
     plant.write_text(fine.read_text())
     moved.write_text(_PLANT.format(drum=0.02))
-    folder, robot = tmp_path / "out", tmp_path / "planar-4.toml"
-    # a quarter of the cycle rate, which takes a quarter of the time
-    shipped = (SHIPPED / "robots" / "planar-4.toml").read_text()
-    robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
+    folder, robot = tmp_path / "out", slower_robot(tmp_path, "planar-4")
     words = ["calibrate", "run", str(robot), "--scanner", "--plant", str(plant)]
     words += ["--out", str(folder), "--poses", "15"]
     killed_after(4, folder / "data.json", words)

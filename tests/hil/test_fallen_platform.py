@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +21,6 @@ LOOSE_N, TAKES_UP_N = 15.0, 40.0
 """Tension of an inactive winch, and tension to take up slack, both with friction."""
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("robots")
-    for name in ("spatial-8", "suspended-8"):
-        slower_robot(place, name)
-    return place
-
-
 def turned_deg(robot: LockstepRobot) -> float:
     angle_rad = Rotation.from_matrix(np.reshape(robot.truth()["rotation"], (3, 3))).magnitude()
     return float(np.degrees(angle_rad))
@@ -41,8 +32,8 @@ def highest_N(robot: LockstepRobot, since: int) -> float:
 
 
 @pytest.fixture(scope="module")
-def tight(folder: Path) -> Iterator[LockstepRobot]:
-    with local_robot(folder / "spatial-8.toml") as robot:
+def tight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LockstepRobot]:
+    with local_robot(slower_robot(tmp_path_factory.mktemp("tight"), "spatial-8")) as robot:
         robot.enable()
         robot.carry_out("tighten")
         yield robot
@@ -98,29 +89,17 @@ def test_tighten_from_lengths_finds_a_platform_that_landed_upright(tight: Lockst
     tight.program("tighten")  # at home again, `from` is not needed
 
 
-@contextmanager
-def held_by_axes(folder: Path, name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
-    """Yield a robot whose platform is suspended with each cable held separately, as by brakes."""
-    with local_robot(folder / f"{name}.toml") as robot:
+def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(tmp_path: Path) -> None:
+    position_m = [1.5, 1.0, 1.5]
+    with local_robot(slower_robot(tmp_path, "suspended-8")) as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=position_m)
         engine = robot.loop.engine
+        # each winch holds its cable separately, as by brakes
         engine.parts.programs["tighten"]._parts.slacken()  # type: ignore[attr-defined]
         engine.switch("hold")
         robot.run(0.5)
-        yield robot
-
-
-@pytest.mark.parametrize(
-    ("name", "position_m"),
-    [("spatial-8", [-0.4, 0.5, 1.7]), ("suspended-8", [1.5, 1.0, 1.5])],
-)
-def test_tighten_from_lengths_keeps_a_suspended_platform_in_place(
-    folder: Path, name: str, position_m: list[float]
-) -> None:
-    with held_by_axes(folder, name, position_m) as robot:
-        engine = robot.loop.engine
         known = engine.parts.estimator
         length_m = known.estimate.cable_length_m.copy()
         slipped_m = np.eye(8)[0] * 0.3

@@ -9,13 +9,14 @@ import shutil
 import signal
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
 from typing import Any
 
 import matplotlib.image as mpl_image
 import numpy as np
 import pytest
 from daemon_rig import PATIENCE_S, RealDaemon, until
+
+from tests.slower_robot import slower_robot
 
 _CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = [
@@ -35,7 +36,8 @@ _DRAWING = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    made = RealDaemon(tmp_path_factory.mktemp("page"), "--no-record", robot=Path("planar-3"))
+    folder = tmp_path_factory.mktemp("page")
+    made = RealDaemon(folder, "--no-record", robot=slower_robot(folder, "planar-3"))
     try:
         yield made
     finally:

@@ -23,7 +23,7 @@ from cdpr_tools.teleop.experiment_trial import (
     run_session,
 )
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("slower_profiles")]
 
 OFFSETS_M = ((0.05, 0.02), (0.0, 0.0))
 CONDITION = Condition("A", 4.0, 0.35, 1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 
 pytestmark = pytest.mark.long
@@ -19,7 +19,7 @@ def test_cogging_and_friction_at_the_start_do_not_falsify_lengths() -> None:
     platform = load_robot("suspended-8").platform
     assert platform is not None
     middle_m = 0.5 * (np.array(platform.workspace_min_m) + np.array(platform.workspace_max_m))
-    with LockstepRobot("suspended-8") as robot:
+    with local_robot("suspended-8") as robot:
         robot.enable()
         robot.carry_out("tighten")
         found_Nm = np.array(robot.progress["learnt_friction_Nm"])
@@ -33,7 +33,7 @@ def test_cogging_and_friction_at_the_start_do_not_falsify_lengths() -> None:
 
 def test_six_suspended_cables_are_tightened_without_trouble(tmp_path: Path) -> None:
     """The estimated position changes while the force on the stand is removed."""
-    with LockstepRobot(slower_robot(tmp_path, "suspended-6")) as robot:
+    with local_robot(slower_robot(tmp_path, "suspended-6")) as robot:
         robot.enable()
         robot.carry_out("tighten")
         assert not robot.progress["trouble"]

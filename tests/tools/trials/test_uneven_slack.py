@@ -13,6 +13,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED
 from cdpr_rt.robot import Error
 from cdpr_tools.lockstep_robot import LockstepRobot
+from tests.local_robot import local_robot
 from tests.slower_robot import slower_robot
 
 pytestmark = pytest.mark.long
@@ -82,7 +83,7 @@ def test_slack_is_taken_up_without_moving_the_platform(
     name: str, slack_m: list[float], tmp_path: Path
 ) -> None:
     file = plant(tmp_path / "plant.toml", slack_m)
-    with LockstepRobot(slower_robot(tmp_path, name), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, name), plant=file) as robot:
         robot.enable()
         robot.program("tighten")
         while robot.progress.get("stage") != "beyond":
@@ -100,7 +101,7 @@ def test_a_cable_that_becomes_tight_in_motion_does_not_move_the_platform(
     slack_m = [0.057, 0.041, 0.028, 0.036, 0.043, 0.024, 0.017, 0.049]
     file = plant(tmp_path / "plant.toml", slack_m)
     file.write_text("seed = 101\n" + file.read_text())
-    with LockstepRobot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         moved, turned_deg = moved_mm(robot, "spatial-8")
@@ -124,7 +125,7 @@ motor.cogging = [
 ]
 """
     )
-    with LockstepRobot(slower_robot(tmp_path, "planar-3"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "planar-3"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         assert moved_mm(robot, "planar-3")[0] < 1.0
@@ -134,7 +135,7 @@ def test_cables_that_become_tight_at_the_same_time_do_not_turn_the_platform(tmp_
     """They are reeled in sequentially, because winches with much friction pull some newtons."""
     file = plant(tmp_path / "plant.toml", SLACK_m)
     file.write_text("seed = 100\n" + file.read_text() + MUCH_COGGING)
-    with LockstepRobot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         moved, turned_deg = moved_mm(robot, "spatial-8")
@@ -147,7 +148,7 @@ def test_tighten_fails_if_one_winch_drags_the_platform(tmp_path: Path) -> None:
     """The platform has half the mass of its file, so that the allowed tension moves it."""
     file = plant(tmp_path / "plant.toml", SLACK_m)
     file.write_text("seed = 100\nplatform.mass_error = -0.5\n" + file.read_text() + MUCH_COGGING)
-    with LockstepRobot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "spatial-8"), plant=file) as robot:
         robot.enable()
         with pytest.raises(Error, match="further out than it was alone"):
             robot.carry_out("tighten")
@@ -158,7 +159,7 @@ def test_the_possible_displacement_of_a_light_platform_is_reported(tmp_path: Pat
     """The true displacement is between a third of the reported value and this value."""
     file = plant(tmp_path / "plant.toml", SLACK_m[:4])
     file.write_text("seed = 100\n" + file.read_text())
-    with LockstepRobot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         (told,) = robot.status()["notices"]
@@ -167,7 +168,7 @@ def test_the_possible_displacement_of_a_light_platform_is_reported(tmp_path: Pat
         most_mm = float(stands[1])
         assert most_mm / 3.0 < moved_mm(robot, "planar-4")[0] < most_mm
     file.write_text("start.slack_m = 0.02\n")
-    with LockstepRobot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         assert not robot.status()["notices"]
@@ -176,7 +177,7 @@ def test_the_possible_displacement_of_a_light_platform_is_reported(tmp_path: Pat
 def test_tighten_reports_a_platform_too_light_for_its_winches(tmp_path: Path) -> None:
     """The torque that turns an unloaded winch of `planar-4` moves its 3 kg platform."""
     file = plant(tmp_path / "plant.toml", [0.0, 0.3, 0.3, 0.3])
-    with LockstepRobot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
         robot.enable()
         with pytest.raises(Error, match=r"mm more slack than .* moves this light platform"):
             robot.carry_out("tighten", 60.0)
@@ -188,7 +189,7 @@ def test_a_winch_blocked_by_friction_is_not_mistaken_for_a_moved_platform(
     """With this seed, friction blocks a winch before its 20 mm of slack are reeled in."""
     file = tmp_path / "plant.toml"
     file.write_text("seed = 10\n")
-    with LockstepRobot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
+    with local_robot(slower_robot(tmp_path, "planar-4"), plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten")
         assert moved_mm(robot, "planar-4")[0] < 1.0
@@ -202,7 +203,7 @@ def test_a_platform_that_could_tip_over_is_not_pulled_by_a_single_winch(tmp_path
     assert cdpr_here("robot", "new", str(name), *answers, "--yes").returncode == 0
     file = plant(tmp_path / "plant.toml", [0.02] * 8)
     file.write_text(file.read_text() + WORSE_MOTORS)
-    with LockstepRobot(name, plant=file) as robot:
+    with local_robot(name, plant=file) as robot:
         robot.enable()
         robot.carry_out("tighten", 60.0)
         position_mm, turned_deg = moved_mm(robot, name)
@@ -215,6 +216,7 @@ def test_winch_friction_above_the_least_tension_leaves_no_cable_slack(tmp_path: 
     name, file = tmp_path / "heavy.toml", tmp_path / "plant.toml"
     text = (SHIPPED / "robots" / "planar-4.toml").read_text()
     for old, new in (
+        ("sync_period_s = 0.001", "sync_period_s = 0.004"),
         ("mass_kg = 3.0", "mass_kg = 20.0"),
         ("tension_min_N = 20.0", "tension_min_N = 8.0"),
         ("tension_max_N = 230.0", "tension_max_N = 150.0"),
@@ -223,7 +225,7 @@ def test_winch_friction_above_the_least_tension_leaves_no_cable_slack(tmp_path: 
         text = text.replace(old, new)
     name.write_text(text)
     file.write_text("start.slack_m = 0.02\nmotor.friction.coulomb_Nm = 0.16\n")
-    with LockstepRobot(name, plant=file) as robot:
+    with local_robot(name, plant=file) as robot:
         robot.enable()
         robot.program("tighten")
         while robot.progress.get("stage") != "beyond":
