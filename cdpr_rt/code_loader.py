@@ -77,7 +77,7 @@ def _loaded(point: Any) -> Any:
     except (Exception, SystemExit) as error:
         package = "" if point.dist is None else f" of the package {point.dist.name}"
         raise CodeError(
-            f"{point.name}{package}: {type(error).__name__}: {error}; mend or uninstall it"
+            f"{point.name}{package}: {type(error).__name__}: {error}; repair or uninstall it"
         ) from error
 
 

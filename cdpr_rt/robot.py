@@ -434,7 +434,7 @@ class Robot:
     def _move(
         self, wait: bool, speed_m_s: float | None, frame: str | None = None, **to: ArrayLike | None
     ) -> None:
-        """Move by or to the two places `to`, a position and a rotation."""
+        """Move to the position and rotation in `to`, or by them, as its keys say."""
         if not self._k:
             raise Refused(f"{self.name} has no platform; use turn_to, turn_by or pay_out")
         sizes = (self._k, "coordinate, in m"), (self._c, "controlled angle, in rad")

@@ -199,7 +199,7 @@ def _sheet(path: Path, content: bytes, node_id: int) -> DataSheet:
         reader.add(index, head, entries.pop(index, {}))
     for index, orphans in entries.items():
         for section in orphans.values() if index >= 0x1000 else ():
-            problem = f"there is no section [{index:04X}] for it; left out"
+            problem = f"no section [{index:04X}] describes it; left out"
             sheet.remarks.add(section.place(), problem)
     sheet.require(0x1000, "every CANopen device has this object")
     return sheet
@@ -262,7 +262,7 @@ def _begin(line: str, number: int, sections: _Sections) -> _Section:
         return _Section("")
     name = match[1].strip()
     if name.lower() in sections:
-        sections.remarks.add(f"[{name}]", "is there twice; the first value of each key counts")
+        sections.remarks.add(f"[{name}]", "appears twice; the first value of each key counts")
     return sections.put(_Section(name))
 
 

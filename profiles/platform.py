@@ -55,7 +55,7 @@ _PoseName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 Direction = Annotated[
     tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
 ]
-"""A direction in the room; its length in the file does not matter, reading normalises it."""
+"""A direction in the room; its length in the file does not matter, because it is normalised."""
 _Inertia = Annotated[
     tuple[float, ...],
     _one_or_several("six numbers Ixx Iyy Izz Ixy Ixz Iyz, not a matrix; in a plane one number"),
@@ -390,9 +390,8 @@ def _reach_faults(
         i = beside_m.index(max(beside_m))
         if beside_m[i] > _OFF_BODY_m:
             problem = (
-                f"value {list(anchors[i])}; {beside_m[i]:.3g} m beside platform.body; allowed: "
-                f"on it, or up to {_OFF_BODY_m:g} m beside it (does the body include all anchor "
-                "points?)"
+                f"value {list(anchors[i])}; {beside_m[i]:.3g} m outside platform.body; allowed: on "
+                f"it, or up to {_OFF_BODY_m:g} m from it (does the body include all anchor points?)"
             )
             yield f"axes[{i}].anchor_point_m", problem
         points += [body.min_m, body.max_m]
@@ -405,8 +404,8 @@ def _reach_faults(
     if off_m > allowed_m:
         what = "anchor points" if body is None else "anchor points and body"
         problem = (
-            f"value {list(centre)}; {off_m:.3g} m beside the box around {what}; allowed: in it, or "
-            f"up to {allowed_m:.3g} m beside it (platform.body gives the extent of the platform)"
+            f"value {list(centre)}; {off_m:.3g} m outside the box around {what}; allowed: in it, "
+            f"or up to {allowed_m:.3g} m from it (platform.body gives the extent of the platform)"
         )
         yield "platform.centre_of_mass_m", problem
 

@@ -99,7 +99,7 @@ class Limit(IntEnum):
     NOT_FINITE = (
         15,
         "quick stop",
-        "the controller's torque is {}, a finite number is required",
+        "the controller's torque is {}; a finite number is required",
         "Nm",
         1.0,
         "pose",
@@ -131,8 +131,8 @@ class Limit(IntEnum):
     LENGTHS_JUMP = (
         21,
         "controlled stop",
-        "the cables' lengths suddenly changed against each other by {:.1f} mm, {:.1f} mm allowed: "
-        "a cable slipped or met an obstacle",
+        "the cables' lengths suddenly changed relative to each other by {:.1f} mm, {:.1f} mm "
+        "allowed: a cable slipped or met an obstacle",
         "m",
         1e3,
         "lengths",

@@ -101,7 +101,7 @@ class FrameLog:
                 self._file.truncate(0)
         except BlockingIOError:
             self._file.close()
-            raise OSError(errno.EBUSY, "another simulator writes it") from None
+            raise OSError(errno.EBUSY, "another simulator is writing to it") from None
         self._listeners: list[FrameListener] = []
         self._waiting = 0
 

@@ -32,7 +32,7 @@ from cdpr_profiles.errors import printable
 from cdpr_tools.streams import procedure_token
 
 _PROGRESS_S: Final = 0.2
-"""Least time between two lines of a procedure's progress."""
+"""Shortest time between two lines of a procedure's progress."""
 _SLOW_S = 2.0
 _ESTIMATED_FROM = 0.005
 """Share of the work after which the remaining time is shown."""
@@ -66,7 +66,7 @@ _GAPS: Final = re.compile(r"^\s+|\s{2,}(?=\S)")
 """The gap between a label and the text after it."""
 _SPACE: Final = "\0"
 _LEAST_TEXT: Final = 20
-"""Least width, in characters, of a text next to its label and of the first column of a table."""
+"""Smallest width, in characters, of a text next to its label and of the first column of a table."""
 
 
 def fold(text: str, width: int | None) -> str:
@@ -360,7 +360,7 @@ class Advance:
         """Return the progress as text, and the estimated remaining time."""
         elapsed_s = time.monotonic() - self._begun_s
         if not self.total:
-            return f"{self.what}: for {elapsed_s:.0f} s now"
+            return f"{self.what}: running for {elapsed_s:.0f} s"
         # a file that is still being written grows beyond its initial size
         share = min(self.done / self.total, 1.0)
         if share < _ESTIMATED_FROM:

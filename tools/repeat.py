@@ -299,7 +299,7 @@ def _described(a: Piece | None, b: Piece | None) -> str:
     if a is None or b is None:
         ends, there = ("first", b) if a is None else ("second", a)
         assert there is not None  # one of the two has more
-        return f"{there[0]}: the {ends} has no more"
+        return f"{there[0]}: the {ends} file has already ended"
     if a[0] != b[0]:
         return f"{a[0]} in one file, {b[0]} in the other"
     if a[0].startswith("byte "):

@@ -54,7 +54,7 @@ class OutputLostError(WorkFailedError):
 
 
 class _Standard(io.RawIOBase):
-    """One of the two descriptors, below TextIOWrapper and BufferedWriter."""
+    """Raw output to one of the two descriptors; BufferedWriter and TextIOWrapper write to it."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -186,7 +186,7 @@ def write_notice(text: str) -> None:
 
 
 def _has_room(number: int, patience_s: float | None) -> bool:
-    """Return whether writing is possible, or fails, within this time; None: wait without limit."""
+    """Return whether the descriptor accepts data or fails within this time; None: no limit."""
     poll = select.poll()
     poll.register(number, select.POLLOUT)
     return bool(poll.poll(None if patience_s is None else 1000.0 * patience_s))

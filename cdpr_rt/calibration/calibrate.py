@@ -279,13 +279,13 @@ def in_frame_of_file(
 
 
 def position_shift(found: Fit, file: CableGeometry, poses: FloatArray) -> FloatArray:
-    """Return the mean displacement of positions at `poses` (M, 4, 3) by a fit, m, (k,)."""
+    """Return how far, m, (k,), a fit displaces positions at `poses` (M, 4, 3) on average."""
     by_fit, by_file = _by_both(found, file, poses)
     return np.asarray((by_fit - by_file)[:, 0, : file.coordinates].mean(axis=0))
 
 
 def _by_both(found: Fit, file: CableGeometry, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the poses by the fit, and by the file, for the encoder lengths at `poses`."""
+    """Return the poses that the fit and the file give for the encoder lengths at `poses`."""
     geometry, seen = found.geometry, found.seen
     tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
     drum = geometry.cable[:, DRUM]

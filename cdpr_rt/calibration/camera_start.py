@@ -101,8 +101,8 @@ def _weights(off: FloatArray) -> FloatArray:
 
 
 _LIKELY_deg, _LIKELY_SIGMAS = 15.0, 6.0
-"""Largest likely error of the camera's rotation; it is large because rotations by the robot's file
-are inaccurate."""
+"""Largest likely error of the camera's rotation; it is large because rotations from the robot's
+file are inaccurate."""
 _ROOM_m, _ROOM_rad = 0.2, 0.15
 """If the layout of known markers is displaced by at most this, it is given in the robot's frame."""
 
@@ -233,10 +233,9 @@ def _moved_m(room: Rigid, map_: marker_map.MarkerMap) -> float:
 def _other_room(room: Rigid, map_: marker_map.MarkerMap) -> str:
     return (
         f"the known markers put the platform {_moved_m(room, map_):.2f} m and "
-        f"{math.degrees(angles(room.rotation)):.0f} deg from its place by the robot's "
-        "file: the fit assumes that the markers have a separate frame, so they do not "
-        "give the robot's place in its room; check their places if they were measured "
-        "in the robot's frame"
+        f"{math.degrees(angles(room.rotation)):.0f} deg from its place according to the robot's "
+        "file: the fit assumes that the markers have a separate frame, so they do not give the "
+        "robot's place in its room; check their places if they were measured in the robot's frame"
     )
 
 
@@ -355,7 +354,7 @@ def markers_of_map(
     sheets: MarkerSheets,
     sightings: Sequence[marker_map.Sighting],
 ) -> marker_map.SeenMarkers:
-    """Return the seen markers that have a pose in a map of `ids`, from images with at least two."""
+    """Return the seen markers with a pose in a map of `ids`, from images that show at least two."""
     number = {marker: k for k, marker in enumerate(ids) if placed[k]}
     rows = [
         (image, number[marker], corners)

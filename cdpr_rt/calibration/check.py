@@ -30,11 +30,11 @@ from cdpr_rt.model.cable_kernel import run_poses
 _HOME_m, _HOME_rad = 0.002, 0.004
 """Standard deviation of the platform's pose at home if nothing has changed."""
 _GAIN = 30.0
-"""Least reduction of the sum of squared residuals by a change, in units of their variance."""
+"""Smallest reduction of the sum of squared residuals by a change, in units of their variance."""
 _EACH_PARAMETER = 6.0
 """Additional reduction required for each parameter of the change."""
 _LEAST_NOISE = 0.1
-"""Least estimated variance of readings, relative to the assumed one."""
+"""Smallest estimated variance of readings, relative to the assumed one."""
 _ALIKE = 0.8
 _MOST_CHANGES = 3
 _LARGEST = {"exit": 0.1, "length": 0.1, "drum": 0.03, "slip": 0.1}
@@ -133,7 +133,9 @@ class Check:
             return [f"UNCHANGED: {off}", *small]
         lines = [f"MOVED: {change.text}" for change in self.changes]
         if self.misfit > _MISFIT:
-            lines.append("MOVED: not explained by single cables: the frame, or several cables")
+            lines.append(
+                "MOVED: single cables do not explain it; check the frame and several cables"
+            )
         return [off, *lines]
 
 
@@ -229,13 +231,15 @@ class _System:
         return self._solve(columns)[2] / float(max(self._freedom - used, 1))
 
     def _noise(self, columns: Sequence[IntArray]) -> float:
-        """Return the variance of the remaining residuals, at most that assumed for readings."""
+        """Return the variance of the remaining residuals, but no more than is assumed for
+        readings."""
         return min(max(self.misfit(columns), _LEAST_NOISE), 1.0)
 
     def best(
         self, columns: Sequence[IntArray]
     ) -> tuple[str, int, int, tuple[int, ...], IntArray] | None:
-        """Return the further change that explains most of the residuals, None if not certain."""
+        """Return the further change that explains most of the residuals; None if it is
+        uncertain."""
         before = self._solve(columns)[2]
         gains = {}
         for key, own in self._own.items():

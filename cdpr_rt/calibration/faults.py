@@ -27,13 +27,13 @@ FaultKind = Literal[
     "drum", "elongation", "image", "marker", "camera", "lens", "size", "hand_eye", "place",
 ]  # fmt: skip
 _OUTLIER, _JUMP = 25.0, 40.0
-"""Least first-order reduction of the sum of squared residuals if a reading is left out."""
+"""Smallest first-order reduction of the sum of squared residuals if a reading is left out."""
 _LEAST_GAIN = 16.0
-"""Least ratio of that reduction to the variance of the remaining residuals (F-test)."""
+"""Smallest ratio of that reduction to the variance of the remaining residuals (F-test)."""
 _MOST_FAULTS = 16
 _ALIKE, _MAYBE = 0.8, 0.2
 _LEAST_REDUNDANCY = 0.05
-"""Least redundancy of a reading; below it, the other readings cannot show that it is wrong."""
+"""Smallest redundancy of a reading; below it, the other readings cannot show that it is wrong."""
 _ENDS = 2
 """Number of poses at both ends at which a jump looks like an outlier."""
 _FAR = 3.0
@@ -253,8 +253,8 @@ def _with_distance(fault: Fault, found: Fit, seen: Observations) -> Fault:
     measured = np.where(np.isfinite(std_m), seen.position_m[j, :k], np.nan)
     size = float(np.sqrt(np.nansum((measured - there) ** 2)))
     text = (
-        f"pose {seen.number(j)}: the measured point is {1e3 * size:.1f} mm from the position by "
-        "all other readings"
+        f"pose {seen.number(j)}: the measured point is {1e3 * size:.1f} mm from the position that "
+        "all other readings give"
     )
     if slip := point_slips.row_slip(measured, there, float(std_m.min())):
         text += f"; it fits if {slip}"
@@ -296,8 +296,8 @@ def _worst(found: Fit) -> list[Fault]:
     alike = _alike(single[j], i)
     who = found.geometry.cables_text(i, alike, _UNSURE)
     text = (
-        f"{who} at pose {seen.number(j)} is {1e3 * size:+.1f} mm off the other lengths: {what}; "
-        "its length there is left out"
+        f"{who} at pose {seen.number(j)} is {1e3 * size:+.1f} mm off the length that the others "
+        f"give: {what}; its length there is left out"
     )
     tried = [Fault("point", -1, j, 0.0, "")] if points[j] > _MAYBE * single[j, i] else []
     if single[j, i] > _MAYBE * points[j]:
@@ -400,7 +400,7 @@ _CHANCE, _CHANCE_BESIDE_LENS = 1e-3, 1e-5
 """Probability of rejecting a correct hand-eye transform. It is lower if the lens is also wrong,
 because the lens then explains most of the camera's displacement."""
 _AT_ONCE = 3
-"""Least number of jumps at the same pose that a moved camera may explain."""
+"""Smallest number of jumps at the same pose that a moved camera may explain."""
 _SURE = 9.0
 """Reduction of the sum of squares by which one explanation must be better than others."""
 

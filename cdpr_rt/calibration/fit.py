@@ -30,7 +30,7 @@ from cdpr_rt.model.cable_kernel import CABLE_ROWS, run_poses
 from cdpr_rt.model.rigid_body import G_m_s2
 
 _UNIT = 0.05
-"""Change of a parameter, m and rad, that counts as large for every prior."""
+"""Unit of the size of a parameter's change: its prior deviation, but at most this, m and rad."""
 
 
 class NormalEquations:
@@ -161,7 +161,7 @@ class Elongations:
     """1 + κ in the first case; `by_true` is that of the second."""
     by_true: float
     share: float
-    """Probability of the second case, by the prior of κ."""
+    """Probability of the second case, given the prior of κ."""
     taken_out: float
     """q for which the fit finds the weighted mean of both."""
 
@@ -193,7 +193,7 @@ def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
 
 _MOST_STEPS = 60
 _DONE = 1e-4
-"""The search ends if the largest step, over the parameter's standard deviation, is less."""
+"""The search ends if the largest step, over the parameter's standard deviation, is below this."""
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-13, 1e8
 _HUBER = 2.5
 """Residual, in standard deviations, above which a length or measured point gets less weight
@@ -570,7 +570,7 @@ _HELD = 3.0
 """If a pose's residual is above this multiple of the median, another force must act on the
 platform."""
 _LEAST_SHARE = 0.2
-"""Least standard deviation of a length that the fit may find, relative to the prior one."""
+"""Smallest standard deviation of a length that the fit may find, relative to the prior one."""
 
 
 @dataclass(frozen=True)
@@ -647,7 +647,7 @@ def with_noise_seen(found: Fit, file: CableGeometry, found_N: float | None) -> C
     """Return the robot's file with the accuracy of readings that a fit has found.
 
     The assumed uncertainty of encoders and torques is a guess for all robots. The equilibrium gives
-    the uncertainty of tensions, `found_N`, with a limit by the residuals of lengths. If a camera
+    the uncertainty of tensions, `found_N`, with a limit from the residuals of lengths. If a camera
     determines the poses, the residuals of lengths also give the uncertainty of lengths, so that
     lengths and corners are weighted correctly. Uncertainties are only reduced, never increased.
     """

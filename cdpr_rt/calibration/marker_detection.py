@@ -33,7 +33,7 @@ _ENDS = 0.07
 _REACH = 0.42, 1.8, 7.0
 """Length of a profile across an edge: share of a square of the marker, least and most px."""
 _LEAST_CONTRAST = 15.0
-"""Least difference of grey levels between ink and paper."""
+"""Smallest difference of grey levels between ink and paper."""
 _MOST_OFF_px = 0.8
 _LEAST_POINTS = 12
 _PASSES, _FITS = 2, 4
@@ -163,7 +163,7 @@ def _intersections(
 # OpenCV's marker dictionaries by name, and detection of the one that an image shows.
 
 _LEAST_READ = 4
-"""Least number of ids that proves a dictionary; one or two ids of a large one may be read by
+"""Smallest number of ids that proves a dictionary; one or two ids of a large one may be read by
 chance."""
 
 
@@ -276,14 +276,14 @@ def _sharpness_problem(pixels: NDArray[np.uint8], found: int, width_px: float) -
             return f"blurred: edges are {width_px:.0f} px wide; allowed: {_BLURRED_px:.0f}"
         return None
     if (pixels >= _BRIGHT).mean() > _BURNT_SHARE:
-        return "overexposed: most of it is white"
+        return "overexposed: most of the image is white"
     smooth = cv2.GaussianBlur(
         pixels.astype(np.float32), (0, 0), 1.0
     )  # so that noise does not count as an edge
     slope = np.hypot(np.diff(smooth, axis=0)[:, :-1], np.diff(smooth, axis=1)[:-1])
     low, high = np.percentile(pixels, (1.0, 99.5))
     if np.percentile(slope, 99.8) < _SOFT_SHARE * (high - low):
-        return "blurred: it has no sharp edge"
+        return "blurred: the image has no sharp edge"
     return None
 
 

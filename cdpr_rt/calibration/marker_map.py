@@ -53,7 +53,7 @@ class SeenMarkers:
         places = [row[:2] for row in rows]
         if len(set(places)) < len(places):
             image, marker = next(a for a, b in pairwise(places) if a == b)
-            raise InvalidRequestError(f"marker {marker} is there twice in image number {image}")
+            raise InvalidRequestError(f"marker {marker} appears twice in image number {image}")
         ids = tuple(sorted({marker for _, marker in places}))
         if missing := [marker for marker in ids if marker not in size_m]:
             raise InvalidRequestError(f"marker {missing[0]} was seen, but its size is not stated")
@@ -284,7 +284,7 @@ def _advice(
 ) -> list[str]:
     said = []
     if not islands:
-        return ["no image shows a marker: is it the dictionary that was printed?"]
+        return ["no image shows a marker: were markers of another dictionary printed?"]
     for island in islands[1:]:
         said.append(
             f"no image shows {listed(island)} together with the others: take one that shows one "

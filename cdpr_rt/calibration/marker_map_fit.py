@@ -46,10 +46,10 @@ _BAD_SHARE = 0.25
 """A marker is examined if it misfits in more than this share of its images."""
 _BAD_SIGMAS = 6.0
 _LEAST_IMAGES = 3
-"""Least number of good images of a partly covered marker for it to stay in the map."""
+"""Smallest number of good images of a partly covered marker for it to stay in the map."""
 _LEAST_BAD_px = 0.5
 _MISFITS = 0.15
-"""Share of images on the wrong side of an instant that are allowed."""
+"""Allowed share of images on the wrong side of an instant."""
 _SIZE_OFF = 0.004
 _SIZE_SIGMAS = 5.0
 _LENS_OFF, _LENS_SIGMAS = 0.003, 6.0
@@ -151,7 +151,7 @@ def _judged(
     return Suspect(
         marker,
         "twice",
-        f"marker {marker} is there twice, {1e3 * apart:.0f} mm apart: remove one of them",
+        f"marker {marker} appears twice, {1e3 * apart:.0f} mm apart: remove one of them",
     )
 
 
@@ -471,8 +471,8 @@ _GOOD_px, _POOR_px = 0.35, 1.5
 _SCALE_OFF = 0.004
 _FRAME_RATIO = 2.0
 _MIRRORED_IMAGES = 2
-"""Least number of mirrored readings of a marker that is also read correctly: one mirrored reading
-may be chance."""
+"""Smallest number of mirrored readings of a marker that is also read correctly: one mirrored
+reading may be chance."""
 _KNOWN_STD_m = 0.001
 """Default standard deviation of each coordinate of a known position."""
 _MISFIT_WEIGHT, _MISFIT_SHARE = 0.05, 0.05
@@ -573,7 +573,7 @@ def _without_suspects(
     """Return the fit without the markers that do not fit."""
     if reference is not None and reference not in seen.ids:
         raise InvalidRequestError(
-            f"reference marker {reference} is not in the map; in it: {listed(seen.ids)}"
+            f"reference marker {reference} is not in the map; the map has {listed(seen.ids)}"
         )
     dropped: list[Suspect] = []
     for _ in range(_MOST_ROUNDS):
@@ -624,7 +624,7 @@ def warnings(sightings: Sequence[Sighting], dropped: Sequence[Suspect]) -> list[
         read = any(marker in one.corners_px for one in sightings)
         if images >= _MIRRORED_IMAGES or not read:
             where = "an image" if images == 1 else f"{images} images"
-            said.append(f"marker {marker} is printed as its mirror image, by {where}; left out")
+            said.append(f"marker {marker} is printed as a mirror image, as {where} show; left out")
     texts: dict[int, list[str]] = {}
     for one in dropped:
         texts.setdefault(one.marker, []).append(one.text)

@@ -32,9 +32,9 @@ MOST_READINGS = 250
 _ROUNDS = 6
 _NORMAL_MEDIAN = 0.6745
 _LEAST_REDUNDANCY = 0.1
-"""Least redundancy of a residual that is used for a scale."""
+"""Smallest redundancy of a residual that is used for a scale."""
 _LEAST_RESIDUALS = 20
-"""Least number of residuals for a scale."""
+"""Smallest number of residuals for a scale."""
 _LARGER, _SAME = 1.3, 1.1
 """Scale above which the noise of a platform at rest is larger than assumed; scale below which a
 change is negligible."""
@@ -43,14 +43,14 @@ _GAP = 2.5
 """A gap between readings is longer than this multiple of the median interval."""
 _GLITCH, _BESIDE, _LEAST_m, _LEAST_rad = 6.0, 9, 0.003, 0.02
 """A point is a glitch if it jumps by more than this many standard deviations, and by more than the
-least distance or angle. The second number is that of the neighbours in time to compare with.
+least distance or angle. The second value is the number of neighbours in time to compare with.
 """
 _OFFSET_STD_s, _SMALL_s = 0.05, 5e-5
 _LOOSE_DRUM, _FAR = 0.1, 3.0
 """Initial standard deviation of drums; multiple of the assumed one above which drums are wrong."""
 _AIM_SHARE, _COPY_SHARE = 0.25, 0.1
-"""Standard deviation of the platform's rotation about its target, as a share of the largest target.
-Then the share of this deviation below which targets are copies of measured rotations.
+"""Standard deviation of the platform's rotation about its target, as a share of the largest target;
+and the share of this deviation below which targets are copies of measured rotations.
 """
 
 WithoutFaults = Callable[[CableGeometry, Observations], tuple[Fit, int]]
@@ -78,15 +78,16 @@ class NoiseSeen:
         known, seen, lines = self.geometry.knowledge, self.seen, []
         if known.length_m > _SAME * self.assumed_length_m or seen.time_s is not None:
             lines.append(
-                f"noise of the lengths by the data: {1e3 * known.length_m:.2f} mm (standard "
-                f"deviation; {1e3 * self.assumed_length_m:.2f} mm was assumed)"
+                f"noise of the lengths, estimated from the data: {1e3 * known.length_m:.2f} mm "
+                f"(standard deviation; {1e3 * self.assumed_length_m:.2f} mm was assumed)"
             )
         if seen.every > 1 or seen.time_s is not None:
             used = "all readings are" if seen.every == 1 else f"one reading in {seen.every} is"
             lines.append(f"{used} used, {seen.poses} in all")
         if known.alike > 1.0:
             lines.append(
-                f"errors of successive readings are alike: {known.alike:.1f} readings count as one"
+                f"errors of successive readings are similar: {known.alike:.1f} readings count as "
+                "one"
             )
         if seen.time_s is None:
             return lines
@@ -125,8 +126,8 @@ def noise_seen(
 ) -> NoiseSeen:
     """Return readings with their estimated noise.
 
-    For a platform at rest, only the noise of lengths is estimated, and it is only increased, if
-    faults of single readings do not explain the residuals. If there are very many readings, only
+    For a platform at rest, only the noise of lengths is estimated. It is only increased, and only
+    if faults of single readings do not explain the residuals. If there are very many readings, only
     every second, third, ... one is used.
     """
     every = -(-seen.poses // MOST_READINGS)
@@ -183,7 +184,7 @@ def _scale(found: Fit, rows: slice) -> float:
 def _by_data(
     geometry: CableGeometry, whole: Observations, every: int, without_faults: WithoutFaults
 ) -> NoiseSeen:
-    """Return one reading in `every`, with the noise by the residuals and without time offset."""
+    """Return one reading in `every`, with the noise from the residuals and without time offset."""
     seen, first = _thinned(whole, every), geometry.knowledge.length_m
     points = seen.position_std_m, seen.rotation_std_rad
     offset_s = offset_std_s = 0.0
@@ -213,13 +214,13 @@ def _by_data(
 def _without_glitches(geometry: CableGeometry, seen: Observations) -> tuple[Observations, int]:
     """Return readings without points that jump for a moment, and the number of these.
 
-    Such a point is much farther from the position by lengths than its neighbours in time. Errors of
-    the geometry affect the neighbours too. A frozen or displaced camera is not a glitch.
+    Such a point is much farther from the position that lengths give than its neighbours in time.
+    Errors of the geometry affect the neighbours too. A frozen or displaced camera is not a glitch.
     """
     there = locate(geometry, seen).poses
     off = np.zeros((seen.poses, 6))
     off[:, :3] = there[:, 0] + there[:, 1:] @ seen.target_m - seen.position_m
-    # the rotation by lengths may be uncertain, so measured rotations are compared with each other
+    # the rotation from lengths may be uncertain, so measured rotations are compared with each other
     off[:, 3:] = Rotation.from_matrix(seen.rotation).as_rotvec()
     known = np.isfinite(np.column_stack([seen.position_std_m, seen.rotation_std_rad]))
     wrong = np.zeros((seen.poses, 2), bool)
@@ -264,7 +265,7 @@ def _rescaled(
     least_m: float,
     points: tuple[FloatArray, FloatArray],
 ) -> tuple[CableGeometry, Observations, bool]:
-    """Return geometry and readings with the noise by the residuals, and whether it is unchanged.
+    """Return geometry and readings with the noise from the residuals, and whether it is unchanged.
 
     `least_m` is the least noise of lengths. `points` are the given standard deviations of positions
     and rotations, which are reduced only if they are guesses.

@@ -47,7 +47,7 @@ _MISFIT = 9.0
 _DISHONEST = 3.0
 """Ratio of actual to predicted errors above which a calibration is not adopted."""
 LEAST_POINTS = 3
-"""Least number of measured poses that determine the robot's position in its room."""
+"""Smallest number of measured poses that determine the robot's position in its room."""
 _MOST_LEFT_OUT = 0.1
 _MOST_POINTS_LEFT_OUT = 0.25
 
@@ -439,10 +439,10 @@ def number_or_none(value: float) -> float | None:
 def frame_of(outcome: Outcome) -> str:
     """Return the frame of the identified coordinates, as text."""
     if outcome.found.seen.measured.sum() >= LEAST_POINTS:
-        return "the room, by measured points"
+        return "the room, given by measured points"
     if outcome.known_room:
-        return "the room, by known places of markers"
-    return "the robot's file, by its exit points and home"
+        return "the room, given by known places of markers"
+    return "the robot's file, given by its exit points and home"
 
 
 def calibration_of(

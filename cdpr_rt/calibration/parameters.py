@@ -54,13 +54,13 @@ class Knowledge:
     anchor_m: float = 0.002
     pulley_m: float = 0.003
     elongation: float = 0.5
-    """Relative standard deviation of the elongation by tension."""
+    """Relative standard deviation of the elongation under tension."""
     length_m: float = 0.0003
-    """Standard deviation of a cable length by the encoder, independent at each pose."""
+    """Standard deviation of a cable length from the encoder, independent at each pose."""
     length_known: bool = False
-    """Whether `length_m` is known; otherwise it may be increased by the readings."""
+    """Whether `length_m` is known; otherwise the readings may increase it."""
     tension_N: float = 3.0
-    """Standard deviation of a tension by the motor's torque, due to dry friction."""
+    """Standard deviation of a tension from the motor's torque, due to dry friction."""
     yielding: float = 1.0
     """Factor on the file's elongation for the uncertainty of lengths due to noise of tensions."""
     slope_noise: float = 0.0
@@ -93,7 +93,7 @@ class CableGeometry:
 
     model: PlatformModel
     compliance_1_N: FloatArray
-    """1/EA of each cable by the file, (n,), 0 for rigid cables."""
+    """1/EA of each cable from the file, (n,), 0 for rigid cables."""
     weight_N_m: FloatArray
     identified: tuple[ParameterKind, ...] = USUAL
     knowledge: Knowledge = field(default_factory=Knowledge)

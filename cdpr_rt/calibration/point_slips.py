@@ -40,11 +40,11 @@ _POINT_COST: Final = 25.0
 _MOST_BAD: Final = 0.25
 """Share of the points that may contradict all others."""
 _GAIN: Final = 12.0
-"""Least cost by which a slip must fit better than no slip."""
+"""Smallest cost by which a slip must fit better than no slip."""
 _SCALE_GAIN: Final = 5.0
 """The same for a slip of the scale alone, which the drums of any robot determine."""
 MARGIN: Final = 9.0
-"""Least cost by which one explanation must fit better than another."""
+"""Smallest cost by which one explanation must fit better than another."""
 _NOISIER: Final = (1.0, 2.0, 4.0)
 """Factors on the given standard deviations of points that are tried."""
 _ODD: Final = 1e-3
@@ -52,7 +52,7 @@ _ODD: Final = 1e-3
 _MISFIT: Final = 9.0
 """Ratio of the sum of squares to its expectation above which no slip explains the points."""
 _LEAST, _MOST = 2, 80
-"""Least and largest number of points that are examined for a common slip."""
+"""Smallest and largest number of points that are examined for a common slip."""
 _GROSS: Final = 300.0
 """If a slip reduces the cost by more than this, no other explanation is considered."""
 _SHIFTS: Final = (1, -1, 2, -2)
@@ -157,7 +157,7 @@ class _Score:
 
 
 class _ByLengths:
-    """Poses by lengths alone, linearised at a geometry."""
+    """Poses from lengths alone, linearised at a geometry."""
 
     def __init__(
         self,
@@ -424,7 +424,7 @@ def _turned(place_m: FloatArray) -> FloatArray:
 
 
 def _turned_near(points: Points, model: _ByLengths) -> Points | None:
-    """Return the points rotated and moved to the positions by lengths; None if too few."""
+    """Return the points rotated and moved to the positions from lengths; None if too few."""
     k = points.place_m.shape[1]
     whole = np.isfinite(points.place_m).all(axis=1)
     if whole.sum() < k:

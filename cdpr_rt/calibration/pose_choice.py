@@ -23,7 +23,7 @@ from cdpr_rt.model.platform_model import PlatformModel
 EXIT_m = OFFSET_m = 0.1
 """Prior standard deviation of exit points and initial lengths, measured by tape."""
 LENGTH_m, POSITION_m, ROTATION_rad = 1e-3, 5e-3, 5e-3
-"""Standard deviations at a pose: of lengths, and of position and rotation by a camera."""
+"""Standard deviations at a pose: of lengths, and of position and rotation from a camera."""
 HAND_EYE_m, HAND_EYE_rad = 0.1, 0.2
 """Prior standard deviations of the camera's pose on its platform."""
 _AT_ONCE = 64
@@ -48,7 +48,7 @@ def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
 
 
 def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntArray:
-    """Return the indices of the `count` poses (m, 4, 3) most informative by cables and camera.
+    """Return the indices of the `count` poses (m, 4, 3) that are most informative.
 
     The choice is greedily D-optimal: each pose increases log det of the information most, given
     those before. The information of a pose is R^T R, see `pose_rows`. The gain of a pose falls as
@@ -72,7 +72,7 @@ def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntAr
 
 
 def _gains(rows: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the gains (m,) of log det by the rows (m, r, P) of each pose."""
+    """Return the gains (m,) of log det from the rows (m, r, P) of each pose."""
     inner = np.eye(rows.shape[1]) + rows @ covariance @ np.swapaxes(rows, 1, 2)
     return np.asarray(np.linalg.slogdet(inner)[1])
 

@@ -154,7 +154,7 @@ class Observations:
     """
 
     length_m: FloatArray
-    """Unstretched cable lengths by the robot's file and its encoders, (N, n)."""
+    """Unstretched cable lengths from the robot's file and its encoders, (N, n)."""
     tension_N: FloatArray
     """(N, n)"""
     start: FloatArray
@@ -185,7 +185,7 @@ class Observations:
     time_s: FloatArray | None = None
     """Times of readings while the platform moves, (N,); None if the platform stood still."""
     every: int = 1
-    """The fit uses every reading of this spacing; errors of the readings between are similar."""
+    """The fit uses one in this many readings; the readings between have similar errors."""
     tension_assumed: bool = False
     """Whether no tension was measured, so that the elongation cannot be identified."""
     std_guessed: bool = False
@@ -318,7 +318,7 @@ class PoseReading(Profile):
     """The target (d,), as for the program `pose`, or the actual position if the platform did not
     reach the target. The first search begins there."""
     length_m: Numbers
-    """Unstretched lengths by encoders and the robot's file, (n,)."""
+    """Unstretched lengths from encoders and the robot's file, (n,)."""
     tension_N: Numbers | None = None
     """Tensions (n,); None if not measured, in which case the middle of the allowed range is
     assumed."""

@@ -63,8 +63,8 @@ def require_enough(geometry: CableGeometry, seen: Observations) -> None:
         return
     if each <= 0.0:
         raise InvalidRequestError(
-            f"{n} cables and {d} directions have no redundancy to calibrate with; give "
-            "measured points (--points)"
+            f"{n} cables and {d} directions leave no redundancy for a calibration; give measured "
+            "points (--points)"
         )
     missing = int(np.ceil((unknown + _LEAST_SPARE - readings) / each))
     raise InvalidRequestError(
@@ -159,7 +159,7 @@ def _of_single_cables(
 
 
 def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> FloatArray:
-    """Return the standard deviations (M, d) of poses (M, 4, 3) by lengths with this geometry.
+    """Return the standard deviations (M, d) of poses (M, 4, 3) from lengths with this geometry.
 
     They are due to the uncertainty of the parameters alone. With `relative`, the best-fitting rigid
     motion of the whole robot is removed first, because without measured points its position in the
@@ -176,13 +176,14 @@ def _std(found: Fit, A: FloatArray) -> FloatArray:
 
 
 SHARED_SCALE_STD: Final = 0.003
-"""Assumed relative standard deviation of the scale common to all measured points, that of a
-tape."""
+"""Assumed relative standard deviation of the scale of all measured points: that of a tape
+measure."""
 
 
 @dataclass(frozen=True)
 class Predicted3Sigma:
-    """Accuracy of poses by lengths with an identified geometry: 3 sigma of the worst coordinate."""
+    """Accuracy of poses from lengths with an identified geometry: 3 sigma of the worst
+    coordinate."""
 
     position_mm: float
     orientation_deg: float | None
@@ -282,7 +283,7 @@ def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> C
 
 
 def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:
-    """Return the derivatives (M, d, P) of poses by lengths, as for `predicted_std`."""
+    """Return the derivatives (M, d, P) of poses from lengths, as for `predicted_std`."""
     geometry = found.geometry
     at = _at(found, poses)
     x, p = at.by_pose, at.by_parameter[..., : geometry.size]

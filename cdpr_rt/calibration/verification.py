@@ -1,4 +1,4 @@
-"""Verification of a calibration: compare held-out measurements with poses by lengths alone."""
+"""Verification of a calibration: compare held-out measurements with poses from lengths alone."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cdpr_rt.calibration.residuals import length_std_m
 from cdpr_rt.calibration.verdict import predicted_std
 
 _LEAST_MARKERS = 2
-"""Least number of markers in an image for a pose, because the tilt of a single marker is
+"""Smallest number of markers in an image for a pose, because the tilt of a single marker is
 uncertain."""
 _LEAST_POSES = 3
 _SURE = 0.975
@@ -77,13 +77,13 @@ def _ratio(computed_m: FloatArray, measured_m: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Verification:
-    """Errors of poses by lengths alone, at poses that the fit has not used."""
+    """Errors of poses from lengths alone, at poses that the fit has not used."""
 
     poses: int
     errors_m: FloatArray
-    """Positions by lengths minus measured ones, (M, k)."""
+    """Positions from lengths minus measured ones, (M, k)."""
     computed_m: FloatArray
-    """Positions by lengths, (M, k)."""
+    """Positions from lengths, (M, k)."""
     turn_errors_rad: FloatArray
     """Errors of measured rotations, (M, 3)."""
     residual_m: float
@@ -95,7 +95,7 @@ class Verification:
 
     @property
     def kind(self) -> Literal["camera", "points", "none"]:
-        """Kind of reference with which poses by lengths are compared."""
+        """Kind of reference with which poses from lengths are compared."""
         if not self.errors_m.size:
             return "none"
         return "camera" if self.by_camera else "points"
@@ -112,17 +112,17 @@ class Verification:
 
     @property
     def mean_mm(self) -> float:
-        """Mean distance between positions by lengths and measured ones."""
+        """Mean distance between positions from lengths and measured ones."""
         return 1e3 * float(np.nanmean(self._distance())) if self.errors_m.size else float("nan")
 
     @property
     def worst_mm(self) -> float:
-        """Largest distance between positions by lengths and measured ones."""
+        """Largest distance between positions from lengths and measured ones."""
         return 1e3 * float(np.nanmax(self._distance())) if self.errors_m.size else float("nan")
 
     @property
     def mean_deg(self) -> float:
-        """Mean angle between rotations by lengths and measured ones."""
+        """Mean angle between rotations from lengths and measured ones."""
         turned = np.linalg.norm(self.turn_errors_rad, axis=1)
         return float(np.degrees(turned.mean())) if turned.size else float("nan")
 
@@ -175,7 +175,7 @@ def verify(
     seen: Observations,
     camera: CameraModel | None = None,
 ) -> Verification:
-    """Return the errors of poses by `geometry` and lengths alone against measurements.
+    """Return the errors of poses from `geometry` and lengths alone against measurements.
 
     If only the camera has measured, the reference is the poses determined by the camera alone.
     """
@@ -208,7 +208,7 @@ def verifies(seen: Observations) -> bool:
 def _beside_camera(
     geometry: CableGeometry, camera: CameraModel, seen: Observations
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return errors of positions, positions, and errors of rotations of `seen.start`, (M, 3).
+    """Return errors of positions, the positions, and errors of rotations of `seen.start`, (M, 3).
 
     Only poses at which the camera saw enough markers are included.
     """
@@ -243,13 +243,13 @@ def _seen_from_first(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
 # wrong measured points, which are not used for verification.
 
 _EACH = 5
-"""One pose in this number is held out from the fit and verifies it."""
+"""One in this many poses is held out from the fit and verifies it."""
 _BLOCKS = 25
 """Number of blocks of successive readings of a moving platform."""
 LEAST_VERIFYING = 3
-"""Least number of measured points that verify a calibration."""
+"""Smallest number of measured points that verify a calibration."""
 LEAST_POSES = _EACH * LEAST_VERIFYING
-"""With fewer poses, too few are held out for a verification."""
+"""With fewer poses, too few would be held out to verify a calibration."""
 
 
 def held_out(seen: Observations) -> BoolArray:
@@ -356,7 +356,7 @@ class Unused:
         return Honesty(actual, predicted, ratio)
 
     def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
-        """Return the errors of poses by lengths alone with a geometry.
+        """Return the errors of poses from lengths alone with a geometry.
 
         If the camera is the reference, its pose on the platform and the pose of its map in the room
         are those that fit this geometry best at the used poses.

@@ -138,7 +138,7 @@ class WinchSpeedLoop:
         self.left_m = np.zeros(n)
         """Length of cable still to be paid out, whether a load pulls it or not."""
         self.push_N = np.zeros(n)
-        """The largest force with which a motor pushes outwards for that, at the cable."""
+        """The largest force at the cable with which a motor pushes `left_m` out."""
         self.tension_N = np.zeros(n)
         """Commanded tension of the last cycle; negative if the motor pushes outwards."""
         self.speed_rad_s = np.zeros(n)

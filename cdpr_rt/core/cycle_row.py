@@ -37,7 +37,7 @@ class CycleField:
     status: bool = False
     """Whether the status shows it for each axis; scalars are always shown."""
     live: bool = False
-    """Whether the live view shows it: angles in degrees, wall times as the longest one in ms."""
+    """Whether the live view shows it: angles in degrees, the longest of each wall time in ms."""
     metric: str = ""
     """Name of the Prometheus metric without prefix, or ""; wall times are histograms."""
     labels: type[LoopState] | type[Reaction] | None = None
@@ -202,12 +202,17 @@ AXIS_FIELDS: Final = (
         status=True,
         live=True,
     ),
-    CycleField("effort_Nm", "<f8", "program.controller.effort_Nm", "the controller's part of it"),
+    CycleField(
+        "effort_Nm",
+        "<f8",
+        "program.controller.effort_Nm",
+        "the controller's part of the torque that was sent",
+    ),
     CycleField(
         "compensation_Nm",
         "<f8",
         "program.controller.compensation_Nm",
-        "the compensation's part of it",
+        "the compensation's part of the torque that was sent",
         live=True,
     ),
     CycleField(

@@ -81,7 +81,7 @@ _BY_CODE: Final = {
     "not_operational": "{drive} left the NMT state operational and is {detail}: find out what else "
     "commands it, then acknowledge",
     "not_finite": "the torque for {drive} was not a finite number; 0 was sent",
-    POWER_UNCONFIRMED: "{drive} does not confirm that its power is off and was reset: "
+    POWER_UNCONFIRMED: "{drive} does not confirm that its power is off, so it was reset: "
     "check that it "
     "has no power",
     BUS_LOST: "{detail}",
@@ -129,7 +129,9 @@ def fault_text(fault: Fault, names: Sequence[str]) -> str:
             limit.factor * fault.value, limit.factor * fault.allowed
         )
     if code == OR_LANDED:
-        text += "; or the platform landed, which also makes a cable slack suddenly: check it"
+        text += (
+            "; or the platform landed, which also slackens a cable suddenly: look at the platform"
+        )
     if fault.suspects:
         text += f", one of {', '.join(axis_name(i, names) for i in fault.suspects)}"
     return text if fault.axis < 0 else f"{axis_name(fault.axis, names)}: {text}"

@@ -151,12 +151,12 @@ class Signals(NamedTuple):
 
 
 _JUMP_rad: Final = 0.05
-"""Allowed distance of an angle from its extrapolation, in addition to that by the speed limit."""
+"""Allowed distance of an angle from its extrapolation, besides what the speed limit allows."""
 _JUMPS_S: Final = 0.01
 """Time for which a jump of an angle affects speeds."""
 _SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
-"""A cable whose winch winds in fast counts as broken below this share of its mean tension over this
-time."""
+"""A cable whose winch winds in fast counts as broken if its tension is below this share of the mean
+over this time."""
 _SUDDEN_m_s, _SUDDEN_S = 0.35, 0.05
 """Increase of the winding-in speed, over this time, by which a broken cable is detected during
 blind lowering. A winch that winds in the slack of a swinging platform reached 0.34 m/s."""

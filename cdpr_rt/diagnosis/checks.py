@@ -56,9 +56,9 @@ def stand_findings(s: Subject) -> Iterator[Finding]:
     i = int((pulled_N / needed_N).argmin())
     names = ", ".join(s.axes[j].name for j in np.flatnonzero(weak))
     text = (
-        f"value {s.model.high_N[i]:g}; on its stand the platform resists only "
-        f"{pulled_N[i]:.2g} N of {names}, but the friction of such winches is usually "
-        f"up to {needed_N[i]:.2g} N: tighten may find slack cables and end"
+        f"value {s.model.high_N[i]:g}; the platform on its stand withstands a pull of only "
+        f"{pulled_N[i]:.2g} N by {names}, but the friction of such winches is usually up to "
+        f"{needed_N[i]:.2g} N: tighten may find slack cables and end"
     )
     remedy = "winches with less friction, or a home where cables pull less against each other, help"
     for times in _TIMES:
@@ -261,9 +261,9 @@ def _motors(s: Subject) -> Iterator[Finding]:
     i = int((held_N * arm_m / rated_Nm).argmax())
     if held_N[i] * arm_m[i] > rated_Nm[i]:
         text = (
-            f"to stand somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, its "
-            f"motor is rated for {rated_Nm[i]:g} Nm; the drive cannot sustain this: a "
-            "smaller box or a larger gear ratio helps"
+            f"to hold the platform at some places of the box, axes[{i}] needs "
+            f"{held_N[i] * arm_m[i]:.3g} Nm, but its motor is rated for {rated_Nm[i]:g} Nm and "
+            "cannot sustain this: a smaller box or a larger gear ratio helps"
         )
         yield Finding("platform.workspace_max_m", text, impossible=False)
 
@@ -282,9 +282,10 @@ def _cable_speeds(s: Subject) -> Iterator[Finding]:
     share = float(arm_m[i] * s.speed_rad_s[i]) / cable_m_s
     if share < 1.0:
         text = (
-            f"value {platform.speed_m_s:g}; along{turning} all directions together cables run at "
-            f"up to {cable_m_s:.3g} m/s, axes[{i}] at {share * cable_m_s:.3g} m/s by its limit of "
-            f"speed; allowed: up to {rounded_down(share * platform.speed_m_s)}"
+            f"value {platform.speed_m_s:g}; in a move along{turning} all directions, cables run at "
+            f"up to {cable_m_s:.3g} m/s, but the speed limit of axes[{i}] allows only "
+            f"{share * cable_m_s:.3g} m/s; allowed: up to "
+            f"{rounded_down(share * platform.speed_m_s)}"
         )
         if turning:
             angular = rounded_down(share * platform.angular_speed_rad_s)
@@ -475,7 +476,9 @@ def _what_helps(
         text = f"tension_min_N up to {loose * low_N.min():.3g} is possible there"
         return text, "limits.tension_min_N"
     turned = len(platform.controlled) > len(platform.home_m)
-    others = ", or other anchor points, whose cables turn it both ways about each axis"
+    others = (
+        ", or other anchor points, whose cables can turn the platform both ways about each axis"
+    )
     return f"only a place farther inside the exit points helps{others if turned else ''}", ""
 
 

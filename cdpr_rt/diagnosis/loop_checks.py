@@ -86,9 +86,10 @@ def _moved(s: Subject, q: FloatArray) -> FloatArray:
 def turned_by_friction(s: Subject) -> str:
     """Return about which axis friction turns the platform too far, as text, or "".
 
-    Usual friction of standard deviation f (n,) in each winch turns it by that of K^-1 J^T f until
-    the integral part has overcome it. The result is "" if the cables can hold the platform with
-    this rotation at all poses of the loop's design with home's orientation.
+    Let f (n,) be the friction of the winches, with its usual standard deviation. It turns the
+    platform by K^-1 J^T f until the integral part has overcome it. The result is "" if the cables
+    can hold the platform with this rotation at all poses of the loop's design with home's
+    orientation.
     """
     model, k, worst, text = s.model, s.model.positions, 1.0, ""
     friction_N = float(_usual_friction_N(s).max())
@@ -103,11 +104,10 @@ def turned_by_friction(s: Subject) -> str:
                 worst = share
                 per_mm_rad = float(np.sqrt(np.linalg.inv(J.T @ J)[i, i])) * 1e-3
                 text = (
-                    f"friction of {friction_N:.2g} N, usual for such winches, turns the "
-                    "platform by "
-                    f"{math.degrees(turned[i]):.2g} deg{_about(model, i)} until the control "
-                    f"overcomes it (1 mm of each cable is {math.degrees(per_mm_rad):.2g} "
-                    f"deg); at {point_text(q[:k])} m the cables can hold it turned by at most "
+                    f"friction of {friction_N:.2g} N, usual for such winches, turns the platform "
+                    f"by {math.degrees(turned[i]):.2g} deg{_about(model, i)} until the control "
+                    f"overcomes it (1 mm of each cable is {math.degrees(per_mm_rad):.2g} deg); at "
+                    f"{point_text(q[:k])} m the cables can hold a rotation of at most "
                     f"{math.degrees(share * turned[i]):.2g} deg: longer arms to the anchor points, "
                     "more cables, or winches with a smaller gear ratio help"
                 )

@@ -500,8 +500,8 @@ def lowest_resonance_Hz(
     """Return the lowest frequencies (...) at positions (..., dimensions), m, in home's orientation.
 
     Cable i has the stiffness k = EA / rho of its length, including the part on its pulley. If its
-    weight counts, sag reduces k, at the least planned tensions. At its end is a
-    rotor with the mass m = J / r^2 (J: its inertia, r: cable per radian). With D = diag(k),
+    weight counts, sag reduces k, at the least planned tensions. At its end is a rotor
+    with the mass m = J / r^2 (J: its inertia, r: cable per radian). With D = diag(k),
     Jacobian A (n, d) and the platform's inertia M (d, d) about its centre of mass, the squares of
     all angular frequencies above zero are the eigenvalues of
 

@@ -85,9 +85,9 @@ def angles(statics: PlatformStatics) -> Iterator[Finding]:
         about = refused(at_rad / angle_rad)
         if about is not None:
             text = (
-                f"value {angle_rad:g}; turned by {math.degrees(at_rad):.3g} deg{about}, the "
-                "cables can hold it nowhere in the box without contact, so no target is "
-                f"accepted; allowed: up to {allowed_rad:.3g}"
+                f"value {angle_rad:g}; if the platform is turned by {math.degrees(at_rad):.3g} "
+                f"deg{about}, the cables can hold it nowhere in the box without contact, so no "
+                f"target is accepted; allowed: up to {allowed_rad:.3g}"
             )
             yield Finding("platform.workspace_angle_rad", text, impossible=True)
             return
@@ -126,9 +126,10 @@ def upright(statics: PlatformStatics) -> Iterator[Finding]:
     tips_at = statics.model.tips_at
     if tips_at < _TIPS_AT:
         text = (
-            f"{100.0 * tips_at:.2g} % of its weight tip it over on its stand, and cables "
-            "that become tight one after the other pull harder: hold it until all are "
-            "tight, or give it a wider foot and describe it in platform.body"
+            f"a force of {100.0 * tips_at:.2g} % of its weight tips the platform over on its "
+            "stand, and cables that become tight one after the other pull harder: hold the "
+            "platform until all are tight, or give it a wider foot and describe the foot in "
+            "platform.body"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
@@ -158,8 +159,8 @@ def uncontrolled_rotation(statics: PlatformStatics, disagree_m: float) -> Iterat
     below_m = platform.home_m[2] - platform.workspace_min_m[2]
     if model.kinematics.hangs_freely and below_m > 0.0:
         text = (
-            f"the box reaches {below_m:.3g} m below home, where the control takes the platform as "
-            "standing and ignores its tilt; allowed: z from "
+            f"the box reaches {below_m:.3g} m below home, where the control assumes that the "
+            "platform stands, and ignores its tilt; allowed: z from "
             f"{platform.home_m[2]:.3g} upward, or a lower home"
         )
         yield Finding("platform.workspace_min_m", text, impossible=True)
@@ -210,9 +211,9 @@ def _hanging(
     least = np.linalg.eigvalsh(stiffness)[:, 0]
     n = t.shape[1]
     mend = (
-        "its cables can control them"
+        "its cables can control these directions"
         if n >= _ENOUGH_CABLES
-        else "to control them, it needs 6 cables"
+        else "to control these directions, the robot needs 6 cables"
     )
     mend = f"; {mend}; anchor points close together, far above the centre of mass, help"
     if least.min() <= 0.0:
@@ -230,7 +231,7 @@ def _hanging(
         k = int(np.linalg.norm(places - box.mean(axis=0), axis=1).argmin())
         periods = swing_periods_s(model, Pose(poses[k, 0], poses[k, 1:]), J[k], t[k])
         shown = " and ".join(f"{period:.2f}" for period in periods)
-        what += f"; with still motors it swings at {point_text(places[k])} m in {shown} s"
+        what += f"; with still motors the platform swings at {point_text(places[k])} m in {shown} s"
     return what + mend, impossible
 
 
@@ -254,8 +255,8 @@ def _in_words(
     text = f"at {point_text(places[k])} m the platform hangs turned by {angle_deg[k]:.1f} deg, "
     if computed:
         return (
-            f"{text}as the control computes from equilibrium, {off_mm[k]:.1f} mm from where it "
-            "would be without that, and swings; an inclinometer measures it",
+            f"{text}{off_mm[k]:.1f} mm from where it would be without that rotation, and swings; "
+            "the control computes the rotation from equilibrium, and an inclinometer measures it",
             False,
         )
     text += "which the control does not compute"

@@ -127,7 +127,7 @@ class StoredMethod(_Part):
 
 
 class CoggingProfile(_Part):
-    """The identified motor, and the drive, motor and encoder that it belongs to."""
+    """An identified motor, and the drive, motor and encoder for which it holds."""
 
     format: Literal[1] = 1
     motor: _Text

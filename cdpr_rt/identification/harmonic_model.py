@@ -43,7 +43,7 @@ _ROUNDS = 5
 _LEAST_SPREAD_Nm = 1e-5
 _EMPTY = 1e-20
 _DEPENDENT = 1e-6
-"""Least determinant of an order's normalised 2 x 2 block."""
+"""Smallest determinant of an order's normalised 2 x 2 block."""
 _EXTRA = 3
 """Columns after the harmonics: static lag, trend of the cogging, trend of the friction."""
 _TREND_SD_1_s = 3e-4
@@ -263,7 +263,7 @@ _UNCORRELATED = 0.05
 
 @dataclass(frozen=True)
 class OrderSelection:
-    """The chosen orders, rising, and the error of fits with 0, 1, ... of them.
+    """The chosen orders in ascending order, and the error of fits with 0, 1, ... of them.
 
     `error_Nm` (k + 1,) is the rms residual with the 0, 1, ... k most significant orders.
     """
@@ -598,9 +598,7 @@ def _choose(
 
 
 def explained(windows: Sequence[Windows]) -> tuple[float, float]:
-    """Return the residual share of squared torque with the most orders, and the independent
-    rows.
-    """
+    """Return the share of squared torque left by a fit of all orders, and the independent rows."""
     every = ColumnLayout(tuple(range(1, _LAG_ORDERS + 1)), FrictionShape(0.0))
     equations = design.accumulate(windows, every)
     rows = rows_counted(equations)

@@ -15,11 +15,11 @@ SAMPLES = 1440
 _WIDTH = 2.0
 """Standard deviation of the smoothing, in samples; the windows are a little wider."""
 _LEAST_SEEN = 0.05
-"""Windows near a sample, as a share of their mean number, for a value there."""
+"""Number of windows near a sample that its value requires, as a share of the mean number."""
 _BOTH = 0.5
 """Share of the turn that two turns must have in common to be compared."""
 _LEAST_SHARE = 0.5
-"""Share of the curve of a single turn, if noise might explain all of it."""
+"""Share that is kept of the curve of a single turn if noise might explain all of it."""
 _LEAST_VARIANCE = 1e-16
 
 

@@ -122,4 +122,4 @@ def likely_cause(order: int, pole_pairs: int, slots: int | None = None) -> str:
         if order % period == 0:
             return f"a multiple of {cause}"
     also = " or slots" if slots else ""
-    return f"no multiple of the pole pairs{also}: unequal slots or magnets, or something coupled"
+    return f"no multiple of the pole pairs{also}: unequal slots or magnets, or a coupled part"

@@ -18,9 +18,9 @@ CONFIDENCE = 0.95
 MOST_UNCERTAINTY = 0.05
 """Relative half-width of the gain above which a calibration is rejected."""
 LEAST_LEVELS = 3
-"""Least number of different tensions in each direction."""
+"""Smallest number of different tensions in each direction."""
 LEAST_SPAN = 2.0
-"""Least ratio of the highest to the lowest tension."""
+"""Smallest ratio of the highest to the lowest tension."""
 
 
 class CalibrationRefusedError(ControlError):

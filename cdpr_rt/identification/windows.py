@@ -205,7 +205,7 @@ def encoder_noise_rad(run: SweepData) -> float:
 
 
 def _spacing(speed_rad_s: float) -> float:
-    """Return the spacing of windows: short for cogging's periods, long for noise."""
+    """Return the spacing of windows: short enough to show cogging, long enough to reduce noise."""
     if speed_rad_s > _QUICK_rad_s:
         return _QUICK_STEP_s
     if speed_rad_s > _FAST_rad_s:

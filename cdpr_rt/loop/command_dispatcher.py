@@ -158,7 +158,7 @@ class CommandDispatcher:
         except ControlError as error:
             answer(refusal_of(error) or str(error))
             return
-        except Exception as error:  # the loop continues for every content of a command
+        except Exception as error:  # the loop continues whatever a command contains
             answer(f"{do}: {type(error).__name__}: {error}")
             return
         deferred = self._deferred
@@ -201,7 +201,7 @@ class CommandDispatcher:
         self._deferred = None
         try:
             deferred.task.result()
-        except Exception as error:  # the loop continues for every content of a file
+        except Exception as error:  # the loop continues whatever a file contains
             mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
             said = refusal_of(error) or f"{mistake}{error}"
             self._reply(_number(deferred.command), said)
@@ -392,7 +392,7 @@ class CommandDispatcher:
         """Return the reason why the loop accepts no command at present, or ""."""
         if self._engine.reacting:
             why = f" ({reason})" if (reason := self._life.reason) else ""
-            return f"the robot is stopping{why}, and lowers a platform; then the power goes off"
+            return f"the robot is stopping{why}: it lowers a platform, then the power goes off"
         return "another command is running"
 
     def _require_running(self, what: str) -> None:

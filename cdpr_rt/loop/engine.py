@@ -449,7 +449,7 @@ class Engine:
             return
         lost = self.right.loss()
         if lost:
-            self.hold(f"{self.program.name}: {lost}; held")
+            self.hold(f"{self.program.name}: {lost}; the robot holds")
 
     # -- programs
 

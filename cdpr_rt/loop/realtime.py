@@ -70,7 +70,7 @@ def _take_core() -> str:
     usable = os.sched_getaffinity(0)
     isolated = _isolated_cores()
     if len(usable | isolated) < _CORES_NEEDED:
-        return f"{len(usable)} core for everything: the loop has no separate core"
+        return f"only {len(usable)} usable core: the loop shares it with everything else"
     ordinary = sorted(usable - isolated)[1:]  # the first core is left for the rest of the machine
     for core in (*sorted(isolated, reverse=True), *reversed(ordinary)):
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)

@@ -251,7 +251,7 @@ class Transitions:
             return
         why_not = engine.right.refusal(right)
         if why_not:
-            life.set_reason(f"{program}: {why_not}; held")
+            life.set_reason(f"{program}: {why_not}; the robot holds")
             raise RefusedError(life.reason)
         engine.switch(program, arguments, right)
 

@@ -49,7 +49,7 @@ class Contact:
     def __str__(self) -> str:
         text = in_words(self.things, self.distance_m)
         if not self.known:
-            text += ", or the check needs too long; choose another way, or go in parts"
+            text += ", or the check takes too long; choose another way, or move in several steps"
         return f"{place_text(self.position, self.coordinates)}: {text}"
 
 

@@ -256,7 +256,9 @@ class CableKinematics:
         cable_kernel.run_cables(self.geometry, pose.array, self._cables)
         if not self._cables[cable_kernel.FREE].min() > 0.0:
             i = int(np.argmin(self._cables[cable_kernel.FREE] > 0.0))
-            raise GeometryError(f"cable {i + 1}: its anchor point lies in its exit point or pulley")
+            raise GeometryError(
+                f"cable {i + 1}: its anchor point lies at its exit point or inside its pulley"
+            )
 
 
 def _points(given: FloatArray) -> FloatArray:

@@ -89,7 +89,7 @@ class LastLengths:
 
     def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
         if held["stopped"] is not True:
-            self.why = f"{self.path}: the robot was moving at the last record"
+            self.why = f"{self.path}: the robot was moving when this was last written"
             self.fallen = True
             return
         self.fallen, self.displaced = (held.get(key, False) is not False for key in _FLAGS)

@@ -211,6 +211,6 @@ def checked_distribution(reference: str, found: Any) -> TensionDistribution:
     """Return `found` if it is callable; otherwise raise CodeError that begins with `reference`."""
     if not callable(found) or isinstance(found, type):
         shown = getattr(found, "__name__", None) or repr(found)[:60]
-        raise CodeError(f"{reference}: {shown} is no function f(W, w, low, high, previous)")
+        raise CodeError(f"{reference}: {shown} is not a function f(W, w, low, high, previous)")
     function: TensionDistribution = found
     return function

@@ -28,7 +28,7 @@ from cdpr_rt.model.workspace import CableWorkspace, wrenches_in_motion
 
 RESERVE, _MARGIN_SHARE = 0.12, 0.4
 """Share of the span of tensions that is reserved for effects that planning omits: control,
-friction, swinging. Then the upper bound of this reserve, as a share of the margin in the middle of
+friction, swinging; and the upper bound of this reserve, as a share of the margin in the middle of
 the box.
 """
 _LEAST_ARM_m = 1e-3

@@ -197,7 +197,7 @@ CONVERGED, UNFINISHED, SINGULAR, STALLED = 0, 1, 2, 3
 """Outcome of a search: converged; out of steps; rank deficient; stalled in a local minimum."""
 
 TOLERANCE = 1e-9
-"""A search ends if the remaining distance to the solution, m and rad, is less."""
+"""A search ends if the remaining distance to the solution, m and rad, is below this."""
 MOST_STEPS = 30
 _SMALL_STEP = 3e-5
 _NEAR = 0.05
@@ -381,7 +381,7 @@ def _relax(geometry: FloatArray, lengths: FloatArray, pose: FloatArray, cables: 
 
     (|c|² - ρ²)/2 is linear in p except for the term |p|²/2. This term is the same for all cables,
     so it cancels in the differences from their mean. The mirror image of a pose in the plane of the
-    exit points has nearly the same lengths; it is no minimum of the relaxed problem.
+    exit points has nearly the same lengths; it is not a minimum of the relaxed problem.
     """
     n = lengths.size
     run_cables(geometry, pose, cables)

@@ -63,7 +63,7 @@ _MOST_LOOKS = 2000
 _SHARE_OF_LENGTH = 0.25
 """Share by which a cable's length may change from one check to the next."""
 _CLOSER = 1.0 / (1.0 - _SHARE_OF_LENGTH)
-"""Factor by which one over the length may grow between two checks."""
+"""Factor by which 1/length of a cable may grow from one check to the next."""
 _FORCE, _MOMENT = 0, 1
 
 

@@ -124,8 +124,8 @@ Triangles = NDArray[np.int64]
 """Triples of vertices, anticlockwise as seen from outside, (f, 3)."""
 _OUTSIDE = 1e3
 _APART = 1e-3
-"""Least distance of a crossing from both ends of its edge, as a share of the edge, so that no two
-crossings coincide."""
+"""Smallest distance of a crossing from both ends of its edge, as a share of the edge, so that no
+two crossings coincide."""
 _CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)])
 
 

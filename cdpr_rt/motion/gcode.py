@@ -606,8 +606,7 @@ class _Reader:
         state = self._state
         named = self._named(words) or list(range(len(self._letters)))
         for i in self._named(words):
-            # words without a number, or relative to an unknown position: go straight to the
-            # reference
+            # a word without a number, or relative to an unknown position, names no point on the way
             unknown = state.relative and not math.isfinite(state.here[i])
             if unknown or not math.isfinite(words[self._letters[i]]):
                 del words[self._letters[i]]

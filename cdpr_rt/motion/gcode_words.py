@@ -21,14 +21,14 @@ _FIRST_CODE: Final = re.compile(
     r"(?:[NT]\s*[0-9]+\s*)*M\s*0*([0-9]+)(?:(?<=862)\.[0-9])?(?![0-9.])", re.IGNORECASE
 )
 _MACRO: Final = re.compile(r"[A-Z_]{3,}[A-Z0-9_]*", re.IGNORECASE)
-"""Name of a macro, as printers' firmware has them."""
+"""Pattern of a macro's name in the firmware of printers."""
 _SETTING: Final = re.compile(r"\$[0-9]+\s*=")
 _FULL_SPEED: Final = re.compile(r"S\s*100(\.0*)?(?![0-9.])", re.IGNORECASE)
 _CHECKSUM: Final = re.compile(r"\*\s*[0-9]+\s*$")
 _LINE_END: Final = re.compile(r"\r\n|\r|\n")
 _PROGRAM_NUMBER: Final = re.compile(r"[O:]\s*[0-9]+$", re.IGNORECASE)
 _QUERIES: Final = frozenset(("$", "$$", "$#", "$G", "$H", "$I", "$N", "$X", "?"))
-"""Commands to grbl that do not move the machine, or only to its switches."""
+"""Commands to grbl that do not move the machine, or move it only to its switches."""
 _MOST_DIGITS: Final = 40
 _LONGEST_NAME: Final = 60
 _LARGEST_VALUE: Final = 1e9

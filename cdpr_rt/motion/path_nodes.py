@@ -195,7 +195,7 @@ NODE_m: Final = 2.0 / np.pi * _SPACING_m
 _TURN_rad: Final = 0.08
 """Largest rotation between nodes, along a piece and around an arc."""
 _LEAST_m: Final = 5e-4
-"""Least cut of a corner that affects the spacing of nodes, to limit their number."""
+"""Smallest cut of a corner that affects the spacing of nodes, to limit their number."""
 MOST_NODES: Final = 1_000_000
 """Largest number of nodes of one path; a node takes about 1 kB, including the arrays for
 planning."""

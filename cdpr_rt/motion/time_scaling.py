@@ -442,7 +442,7 @@ def departures_run(
 PERIOD_S: Final = 0.01
 """Time between the samples of a plan."""
 MOST_SAMPLES: Final = 100_000
-"""Most samples of a plan, which the loop reads between two cycles."""
+"""Largest number of samples of a plan, which the loop reads between two cycles."""
 _TOLERANCE: Final = 1.005
 _ROUNDS: Final = 20
 _FINER: Final = 3.0
@@ -650,7 +650,7 @@ def _smoothed(
     times: FloatArray,
     swept: FloatArray,
 ) -> FloatArray:
-    """Return a run's smoothed motion, (c, 4), with the number of samples of a stretched one."""
+    """Return a run's smoothed motion, (c, 4), with as many samples as if it were stretched."""
     count = max(int(np.ceil(stretch * duration_s / PERIOD_S - _TIME_SCALING_NOTHING)), 1)
     motion = np.zeros((count + 1, 4))
     smooth_run(begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion)

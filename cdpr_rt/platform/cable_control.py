@@ -747,7 +747,7 @@ class CableControl(PlaceChecks):
 
     @property
     def free_lengths_m(self) -> FloatArray:
-        """Unstretched lengths of the cables by the motor angles, (n,)."""
+        """Unstretched lengths of the cables from the motor angles, (n,)."""
         turned = self._motors[tracking.M_PER_RAD] * self._motors[tracking.THETA]
         return np.asarray(self._motors[tracking.AT_ZERO] + turned)
 

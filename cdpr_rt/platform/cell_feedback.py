@@ -169,9 +169,8 @@ class CellCheck:
             return ""
         return (
             f"{self._names[self._named]}: its load cell shows {abs(self._off_N):.0f} N "
-            f"{'more' if self._off_N > 0.0 else 'less'} than by its motor and the balance "
-            f"of forces, {self._allowed_N:.0f} N allowed: tare it, and check its gain and "
-            "wiring"
+            f"{'more' if self._off_N > 0.0 else 'less'} than its motor and the balance of forces "
+            f"give, {self._allowed_N:.0f} N allowed: tare it, and check its gain and wiring"
         )
 
     def clear(self) -> None:

@@ -140,11 +140,11 @@ def _is_positive_definite(S: ComplexArray, H: ComplexArray, square: float) -> bo
 # decays if |z| < 1.
 
 _SQUARINGS, _GROWN = 18, 1e12
-"""Number of squarings of a cycle's matrix, up to the power 2^18; norm of a power above which modes
-grow."""
+"""Number of squarings of a cycle's matrix, up to the power 2^18. If the norm of a power is above
+the second number, modes grow."""
 _TERMS, _MOST_NORM = 13, 0.5
-"""Number of terms of the exponential series, and largest norm for its sum, which is exact to
-1e-15."""
+"""Number of terms of the exponential series, and the largest norm of a matrix for which their sum
+is exact to 1e-15."""
 
 
 class Mode(NamedTuple):
@@ -305,11 +305,11 @@ _TURNED_AWAY_SHARE = 0.5
 """Largest share of the loop's stiffness that tensions may remove, in the slowest loop tried."""
 _STEP, _REFINEMENTS = 1.3, 3
 _CALMING_STEP, _LEAST_SHARE = 0.93, 0.2
-"""Factor by which a loop's damping is repeatedly reduced until its modes decay, and its least
-share."""
+"""Factor by which a loop's damping is repeatedly reduced until its modes decay, and the smallest
+share of the damping that is tried."""
 _LOW_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
 _LOWEST_Hz, _BELOW = 0.02, 12
-"""Least frequency of the slowest modes: tensions that follow a softer platform may make it drift
+"""Lowest frequency of the slowest modes: tensions that follow a softer platform may make it drift
 away."""
 
 
@@ -651,7 +651,7 @@ class _Robot:
 
     platform: Platform
     bounds_N: tuple[tuple[float, ...], ...]
-    """Least and greatest tensions and the reserve to both, which determine the geometric
+    """Smallest and greatest tensions and the reserve to both, which determine the geometric
     stiffness."""
     rotors_kg: tuple[float, ...]
     stiffness_N: tuple[float, ...]

@@ -39,7 +39,7 @@ ComplexArray = NDArray[np.complex128]
 CABLE_DAMPING_s, LITTLE_DAMPING_s = ASSUMED_DAMPING_s, 5e-4
 """b as assumed, and b of cables with little damping: 5 % of critical at 30 Hz."""
 _TAUT_N = 1.0
-"""Least tension at which a cable's sag is approximated by a flat parabola."""
+"""Smallest tension at which a cable's sag is approximated by a flat parabola."""
 _OF_LEAST = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 0.875, 0.625, 0.0)
 _OF_GREATEST = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.125, 0.375, 1.0)
 NONE, LEAST, BETWEEN, GREATEST, LEVELS = 0, 5, 7, 8, 9

@@ -198,8 +198,8 @@ motion."""
 FRICTION_SHARE, COGGING_SHARE = 0.04, 0.03
 """Usual friction and cogging (standard deviation), as shares of the motor's rated torque."""
 MOST_SHARE, MOST_RESERVE_SHARE = 0.08, 1.0 / 3.0
-"""Bounds of friction and cogging, the lesser of two values: a share of the rated torque, and the
-torque for a change of the cable's tension by a share of the reserve of planned tensions."""
+"""Bounds of friction and cogging: a share of the rated torque, or a share of the reserve of planned
+tensions, as a torque. The smaller of the two applies."""
 WRENCH_SHARE, NOISE_SHARE = 0.25, 0.09
 """Usual errors of the platform's wrench, and of one cycle's equation, as shares of the rated
 tension."""

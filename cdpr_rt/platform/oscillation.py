@@ -20,12 +20,12 @@ from cdpr_rt.jit import bound, jit
 AT_REST, ALWAYS = 0, 1
 """The two cases of detection: while the set-point rests, and at any time."""
 RESERVE_SHARES, LEAST_COUNTS = (0.5, 1.5), 4.0
-"""Least amplitude of an oscillation, in each case: the motion that changes the cable's tension by
-this share of the reserve while the platform stands still, but at least this number of encoder
+"""Smallest amplitude of an oscillation, in each case: the motion that changes the cable's tension
+by this share of the reserve while the platform stands still, but at least this number of encoder
 counts."""
 LEAST_Hz, LASTS_S = 5.0, (3.0, 1.0)
-"""Least frequency, and least duration without a pause in each case, so that ringing after a motion
-is not reported."""
+"""Lowest frequency, and shortest duration without a pause in each case, so that ringing after a
+motion is not reported."""
 MEAN, SIDE, SINCE, CHANGES, LASTING, ROWS = range(6)
 """Rows of each motor: mean distance from its set-point, rad; last side of that mean, ±1; time since
 the last change of sides, s; number of changes since the oscillation began, and its duration, s."""
@@ -86,8 +86,8 @@ class Oscillation:
     ) -> None:
         """Take the cables' names, and the arrays of angles (n,) and of the set-point's velocity.
 
-        `threshold_m` (2, n) is the amplitude at rest, and at any time, in metres of its cable, of
-        which a rad of the motor winds `m_per_rad` (n,).
+        `threshold_m` (2, n) are the amplitudes at rest and at any time, in metres of cable;
+        `m_per_rad` (n,) is the cable that a rad of the motor winds.
         """
         self._names, self._threshold_m = tuple(names), threshold_m
         self._rows = np.zeros((2, ROWS, len(names)))

@@ -96,7 +96,7 @@ def take(
 
 @jit
 def _farther(play: float, seen: FloatArray, theta: float, i: int) -> float:
-    """Move the play of motor i; return the signed distance beyond the earlier angles."""
+    """Include an angle of motor i in `seen`; return its signed distance beyond earlier angles."""
     way = 0.0
     if theta > seen[1, i]:
         way = theta - seen[1, i]
@@ -366,5 +366,5 @@ def _moved_back(sums: FloatArray, longer_m: FloatArray) -> FloatArray:
 
 
 def _wider(misfit: FloatArray) -> FloatArray:
-    """Return the factor of variances for a residual over noise, at least 1."""
+    """Return the factor on variances, at least 1, for a ratio of residual to noise."""
     return np.maximum(misfit, 1.0) ** 2

@@ -38,7 +38,7 @@ class CommandArguments:
         return key in self._arguments
 
     def one_of(self, *keys: str) -> str:
-        """Return which one of the keys was given; raises ProgramError for none or several."""
+        """Return which of the keys was given; raises ProgramError unless it is exactly one."""
         given = [key for key in keys if key in self._arguments]
         if len(given) != 1:
             found = " and ".join(given) if given else "none of them"

@@ -214,7 +214,7 @@ def checked_programs(found: Iterable[tuple[str, Any]], taken: Iterable[str]) -> 
     names, programs = set(taken), list[Program]()
     for reference, program in found:
         if not isinstance(program, Program):
-            raise CodeError(f"{reference}: is no program; derive it from cdpr_rt.Program")
+            raise CodeError(f"{reference}: is not a program; derive it from cdpr_rt.Program")
         name = getattr(program, "name", None)
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise CodeError(f"{reference}: name: {name!r}; allowed: small letters, digits, -, _")

@@ -40,14 +40,14 @@ class _Command:
     """Time in the plan to step back to."""
     feed: float
     on_way: bool = False
-    """Whether the way to that time of the plan has been checked."""
+    """Whether the straight way to the place where the path begins has been checked."""
 
 
 class PathProgram(PlatformProgram):
     """Plays a plan from its beginning or from where it was left, after a straight way to there.
 
     A plan is read and checked against the robot's limits before the command is accepted. The feed
-    scales the time along the plan, so the set-point stays on the path for every change of the feed.
+    scales the time along the plan, so the set-point stays on the path whatever the feed.
     It also stays on the path in every stop of this program, and in the program `hold` afterwards.
     """
 
@@ -185,7 +185,7 @@ class PathProgram(PlatformProgram):
         stopping_position(control.position, control.velocity, acceleration, stop)
         obstacle = control.infeasibility(begin) or control.way_infeasibility(begin, stop)
         if obstacle:
-            why = {"why": f"on the way to where it begins: {obstacle}"}
+            why = {"why": f"on the way to the start of the path: {obstacle}"}
             raise ProgramError(CommandRefusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
 
     def _apply(self, command: _Command) -> None:

@@ -167,7 +167,7 @@ class PathPlanner:
         for one, other in itertools.pairwise(ends):
             if begin or plan.obstacle is not None:
                 break
-            advance("what comes later", 0.7)
+            advance("the part that follows", 0.7)
             later = path.part(one, other)
             nodes = nodes_of(later, self.model.wrench_scale)
             plan = replace(plan, obstacle=self._obstacle(nodes)[1])
@@ -238,7 +238,7 @@ class PathPlanner:
         return [*ends, len(path.moves)]
 
     def _earlier(self, path: PathDescription, begin: int, end: int) -> int:
-        """Return an earlier end of a part that takes too long; raises PathError for none."""
+        """Return an earlier end of a part that takes too long; raises PathError if none exists."""
         moves = path.moves
         middle = (begin + end + 1) // 2
         while middle < end and moves[middle].line == moves[middle - 1].line:

@@ -203,7 +203,7 @@ def _keeps_between(
     acceleration: float,
     jerk: float,
 ) -> bool:
-    """Return whether a coordinate keeps within speed and acceleration limits between samples."""
+    """Return whether a coordinate stays within speed and acceleration limits between samples."""
     more = min(0.5 * period * jerk, acceleration)
     for j in range(1, 4):
         _, v, a, _ = _between(samples, period, i, k, 0.25 * j)

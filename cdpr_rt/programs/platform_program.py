@@ -115,7 +115,7 @@ def synchronise(position: FloatArray, target: FloatArray, most: FloatArray) -> N
 
 
 _TOLD_APART_m = 0.005
-"""Least residual that shows whether a platform stood at home; geometry errors cause some mm."""
+"""Smallest residual that shows whether a platform stood at home; geometry errors cause some mm."""
 
 
 class PlatformParts:
@@ -159,11 +159,11 @@ class PlatformParts:
         self.not_calibrated_reason = ""
         """Reason why the geometry is unreliable, for example that a rail has moved; else empty."""
         self.off_home = ""
-        """Text that says how far the platform may stand from the pose by its lengths, which were
-        taken at home."""
+        """Text that says how far the platform may stand from the pose that its lengths give, which
+        were taken at home."""
         self.off_home_by = np.zeros(model.size)
-        """Difference (d,) from home by lengths that were taken at home; 0 if it is not the reason
-        for `off_home`."""
+        """Difference (d,) of the pose from home if the lengths were taken at home; 0 if it is not
+        the reason for `off_home`."""
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False
@@ -386,7 +386,7 @@ class PlatformProgram(CommandedProgram):
         lag_m = self._lag_m()
         if lag_m < _WAITING_m or not self._parts.pose_known:
             return ""
-        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or an obstacle"
+        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction or an obstacle holds it back"
 
     def _move(self) -> bool:
         """Move the platform's set-point; return whether it has arrived."""

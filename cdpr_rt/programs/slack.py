@@ -229,10 +229,10 @@ _MOVED_m, _ALONE_m = 0.005, 0.0025
 by more than the first distance. If all other cables differ by less than the second one, only the
 winch of this cable was stuck."""
 _LEAST_SHARE = 0.2
-"""Least tension of a cable, as a share of the pull of its winch, if friction may be as large as the
-pull."""
+"""Smallest tension of a cable, as a share of the pull of its winch, if friction may be as large as
+the pull."""
 _ALONG_m = 1.5 * LOOSE_m
-"""Least distance to report if the cables may have dragged a light platform."""
+"""Smallest distance to report if the cables may have dragged a light platform."""
 _DIRECTIONS, _POINTS, _ABOUT_UP = 16, 0.2, 5
 """Number of horizontal directions examined; least component of a cable's direction along one of
 them with which it pulls; index of the twist's component about the vertical."""
@@ -361,11 +361,10 @@ class SlackTakeUp:
             return ""
         if slack_m[j] < _TURNED_m and self._winches.high_N[j] < self._enough_N[j]:
             return (
-                f"{self._names[j]}: {self._winches.high_N[j]:.0f} N did not reel it in, but "
-                f"{self._names[i]} by {1e3 * slack_m[i]:.1f} mm: the friction of its winch may "
-                "be up to "
-                f"{self._enough_N[j] / _ENOUGH:.0f} N, and its cable may be slack; increase the "
-                "tensions: see `cdpr robot show`"
+                f"{self._names[j]}: {self._winches.high_N[j]:.0f} N did not reel in its cable, but "
+                f"{self._names[i]} reeled in {1e3 * slack_m[i]:.1f} mm: the friction of the first "
+                f"winch may be up to {self._enough_N[j] / _ENOUGH:.0f} N, and its cable may be "
+                "slack; increase the tensions: see `cdpr robot show`"
             )
         return (
             f"{self._names[i]} had {1e3 * more_m:.1f} mm more slack than {self._names[j]}, "
@@ -401,8 +400,8 @@ class SlackTakeUp:
         if not off_m[i] > _MOVED_m:
             return "", ""
         moved = (
-            f"{self._names[i]}: tight {1e3 * abs(in_m[i]):.1f} mm further "
-            f"{'in' if in_m[i] > 0.0 else 'out'} than it was alone, "
+            f"{self._names[i]}: became tight {1e3 * abs(in_m[i]):.1f} mm further "
+            f"{'in' if in_m[i] > 0.0 else 'out'} than when it was tightened alone, "
             f"{1e3 * (rubbed_m[i] + _MOVED_m):.1f} mm allowed"
         )
         if in_m[i] > 0.0 and np.count_nonzero(off_m > _ALONE_m) == 1:
@@ -450,7 +449,7 @@ class SlackTakeUp:
         enter(first, self._phase, self._state, position_rad)
 
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> bool:
-        """Raise the winches' bounds of tension and set speeds, (n,); return if take-up continues.
+        """Raise the winches' bounds of tension and set speeds, (n,); return whether it continues.
 
         Cables that are reeled in pull with a share of their allowed tension, which grows to 1. They
         pull harder only if the bounds already allow it.
@@ -462,7 +461,7 @@ class SlackTakeUp:
 
 
 def _most_m(towards: FloatArray, slack_m: FloatArray) -> float:
-    """Return how far slack (n,) allows motion in the direction, of m, that allows the largest.
+    """Return how far slack (n,) allows motion, in the one of m directions that allows the most.
 
     `towards` (m, n) is the shortening of each cable per metre of motion; 0 if the cable does not
     point in that direction.
@@ -521,7 +520,7 @@ def _hanging_N(parts: PlatformParts, pretension_N: FloatArray) -> FloatArray:
     lengths_m = np.array([parts.control.lengths_at_home(tension_N) for tension_N in tensions_N])
     steps = np.arange(_HANGING_SHARES.size)[::-1, None]
     straight_m = lengths_m[-1] + steps * (lengths_m[-2] - lengths_m[-1])
-    # a heavy cable with hardly any tension reaches at no length
+    # a heavy cable with hardly any tension spans the distance at no length
     hangs = ~(lengths_m - straight_m <= 0.5 * LOOSE_m)
     return np.asarray(np.max(np.where(hangs, tensions_N, 0.0), axis=0))
 

@@ -184,7 +184,7 @@ def why_not_to_hold(
     carried = standing.carry(model.pose(control.estimated))
     if not why and (_turned_much(parts) or not carried):
         place = _place(control.estimated, model.positions)
-        why = f"by its cable lengths it is {place}, where they could not hold it"
+        why = f"by its cable lengths it is {place}, where its cables could not hold it"
     if not why:
         return ""
     return (
@@ -210,7 +210,7 @@ def disagreement(parts: PlatformParts, source: str = "lengths") -> str:
     at_home = source == "home"
     off = _off(parts, parts.home_lengths_allowed_m if at_home else parts.lengths_allowed_m)
     if off and at_home:
-        return f"{off}; it does not stand at home, or a point differs from the robot's file"
+        return f"{off}; the platform is not at home, or a point differs from the robot's file"
     return f"{off}; put the platform at home and tighten from home" if off else ""
 
 

@@ -70,7 +70,7 @@ def index_path(
 _AGREE_m = 0.002
 """Allowed disagreement of freshly measured lengths, in addition to stretch caused by friction."""
 _OFF_HOME_m = 0.006
-"""Distance from home, by lengths just measured at home, up to which nothing is reported. Friction
+"""Distance from home, computed from lengths just measured there, that is not reported. Friction
 on the stand causes up to 4 mm, which disappears when winches turn."""
 _RUNS_IN_m_s = 0.2
 """Winch speed that is impossible with a tight cable while the platform stands."""
@@ -371,7 +371,7 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
         self._slack = SlackTakeUp(self._winches, parts, self._cable, self._home_pretension_N)
-        # above the friction, a long cable is reeled in more by its sag than by its stretch
+        # above the friction, a long cable is reeled in more because of its sag than of its stretch
         shares = np.array([0.0, 0.5 * TAKE_UP_SHARE, OVERSHOOT])[:, None]
         lengths_m = [parts.control.lengths_at_home(N) for N in shares * self._pretension_N]
         self._once_tight_m = _ONCE_TIGHT_m + float(np.ptp(lengths_m, axis=0).max())
@@ -666,10 +666,10 @@ class TightenProgram(PlatformProgram):
         if moved_m[i] > allowed_m:
             pull_N = self._winches.tension_N[i]
             found = (
-                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in and not tight, "
-                f"{1e3 * allowed_m:.1f} mm allowed: its winch turns with {pull_N:.0f} N; its cable "
-                "is broken, unhooked, or wound off its drum, or the platform is not at home: put "
-                "it there"
+                f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in without becoming "
+                f"tight, {1e3 * allowed_m:.1f} mm allowed: its winch turns at {pull_N:.0f} N; its "
+                "cable is broken, unhooked, or wound off its drum, or the platform is not at home: "
+                "put it there"
             )
             self._parts.last_stop.broken.setdefault(i, found)
             return found
@@ -679,12 +679,15 @@ class TightenProgram(PlatformProgram):
 
     def _late(self) -> str:
         """Return as text which cables are not tight yet, and the pull on each."""
-        late, weak = f"no further cable tight within {_TIGHT_WITHIN_S:g} s", self._not_tight()
+        late, weak = (
+            f"no further cable became tight within {_TIGHT_WITHIN_S:g} s",
+            self._not_tight(),
+        )
         if weak.any():
             return f"{late}: {self._slack.pulls(weak)}"
         i = int(self._stillness.moved_m.argmax())
         pull_N = self._winches.tension_N[i]
-        return f"{late}: {self._parts.names[i]} pulls with {pull_N:.1f} N and does not stand still"
+        return f"{late}: {self._parts.names[i]} pulls with {pull_N:.1f} N and keeps moving"
 
     def _fail_if(self, trouble: str) -> None:
         self._failure = trouble
@@ -693,7 +696,7 @@ class TightenProgram(PlatformProgram):
             names, broken = self._parts.names, self._parts.last_stop.broken
             others = [why for i, why in broken.items() if not trouble.startswith(f"{names[i]}: ")]
             if others:
-                self._failure += f"; before that, {'; '.join(others)}: is it repaired?"
+                self._failure += f"; before that, {'; '.join(others)}: has this been repaired?"
 
     # -- the search for indices
 

@@ -35,7 +35,7 @@ class TrackProgram(Program):
         self.controller, self._motion = controller, motion
 
     def start(self, _feedback: AxisFeedback, _setpoint: Setpoint, _torque_Nm: FloatArray) -> None:
-        """Begin the motion; raises ProgramError without one."""
+        """Begin the motion; raises ProgramError if none was given."""
         if self._motion is None:
             raise ProgramError(
                 f"{self.name}: only a procedure can start it, because it needs a motion"

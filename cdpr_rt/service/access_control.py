@@ -84,7 +84,7 @@ _DOWNLOADS: Final = "/recordings/"
 PROGRESS: Final = "cdpr_rt.progress"
 """Key of a scope: a number that grows while an answer is being made or sent."""
 STOPS_BEFORE: Final = "cdpr_rt.stops"
-"""Key of a scope: the number of stops when the request arrived, which its body may do later."""
+"""Key of a scope: the number of stops when the request arrived, perhaps before its body."""
 _HEADERS: Final = {
     b"content-security-policy": b"default-src 'none'; frame-ancestors 'none'",
     b"cross-origin-resource-policy": b"same-origin",
@@ -249,8 +249,8 @@ class AccessControl:
             raise _RefusedError(
                 HTTPStatus.UNAUTHORIZED,
                 "this daemon has no key file: over TCP everybody may read, hold and disable; for "
-                "the rest use the Unix socket or the page (`cdpr page` prints its address), or "
-                "start the daemon with --key-file"
+                "everything else use the Unix socket or the page (`cdpr page` prints its address), "
+                "or start the daemon with --key-file"
                 if self._policy.key is None or self._policy.open_reading
                 else "Authorization: Bearer KEY is missing or wrong",
             )

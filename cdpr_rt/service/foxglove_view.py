@@ -472,7 +472,7 @@ class LiveView(Part):
 
 
 class _Topics:
-    """The topics of one robot; axes by names that message paths can contain."""
+    """The topics of one robot; axes have names that message paths can contain."""
 
     def __init__(self, server: FoxgloveServer, given: Sequence[str], n: int) -> None:
         self.given = list(given)

@@ -132,7 +132,9 @@ class MetricsCollector(Collector):
             state.add_metric([label], float(label == now))
         yield state
         yield GaugeMetricFamily(
-            "cdpr_loop_silent_seconds", "Time since the loop's last turn", service.link.silent_s()
+            "cdpr_loop_silent_seconds",
+            "Time since the last cycle of the loop",
+            service.link.silent_s(),
         )
         held = float(service.lease.holder() is not None)
         yield GaugeMetricFamily(
@@ -168,7 +170,7 @@ class MetricsCollector(Collector):
 
 
 def _about(field: CycleField) -> str:
-    """Return a field's description; no metric is null, unknown values are omitted."""
+    """Return a field's description; no metric is null; unknown values are omitted."""
     about = field.meaning.partition("; null")[0]
     return about[0].upper() + about[1:]
 
@@ -254,11 +256,11 @@ def _kind(schema: dict[str, Any]) -> str:
 _ABOUT = """State, motion and figures of one robot's control loop.
 
 Reading needs only the connection. `enable`, `program` and `set` need the right to move:
-`POST /control` gives it to one client at a time, the token goes into the header `X-Control-Token`.
+`POST /control` gives it to one client at a time. Send its token in the header `X-Control-Token`.
 `hold`, `disable` and `shutdown` are open to every client with access, without a limit of requests.
-With too many connections over TCP any request gets status 503 and plain text: then send the stop
-again.
-Clients that ask at the same time get one answer. Commands that still wait do not start.
+With too many connections over TCP, the answer to any request is status 503 with plain text: send a
+stop again then.
+Clients that request a stop at the same time get the same answer. A stop cancels waiting commands.
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LeaseError: HTTPStatus.CONFLICT,
@@ -517,7 +519,8 @@ def _add_control(app: FastAPI, service: Service) -> None:
     async def ticket() -> models.Ticket:
         """Get a ticket for one WebSocket without the key: `/live?ticket=T`, `/control?ticket=T`.
 
-        Or for one download of a recording. For browsers, which send no `Authorization` with those.
+        It also serves for one download of a recording. Browsers need it, because they send no
+        `Authorization` with either.
         """
         return models.Ticket(ticket=service.tickets.issue(), valid_s=VALID_S)
 

@@ -156,7 +156,7 @@ class PathFile(ClientRequest):
     ignore: Annotated[
         str, Field(pattern=r"^[A-Za-z0-9._ ]{0,256}$", description="Words of G-code to ignore.")
     ] = ""
-    z_mm: Annotated[float | None, Field(ge=-1e6, le=1e6, description="Z of G-code without Z.")] = (
+    z_mm: Annotated[float | None, Field(ge=-1e6, le=1e6, description="Z for G-code without Z.")] = (
         None
     )
     scale: Annotated[
@@ -180,7 +180,7 @@ class SimulatedFault(ClientRequest):
         str,
         Field(
             pattern="^[a-z-]{1,32}$",
-            description="As for `cdpr sim fault`, such as cut-cable; mend repairs.",
+            description="A fault of `cdpr sim fault`, such as cut-cable; mend repairs them.",
         ),
     ]
 
@@ -222,7 +222,7 @@ class AdoptCalibration(ClientRequest):
     procedure: Literal["adopt"]
     measurement: Annotated[str, Field(pattern="^calibrate-[0-9]{8}-[0-9]{6}$")]
     insignificant: bool = Field(
-        default=False, description="Adopt it even if its changes are not significant."
+        default=False, description="Adopt the calibration even if its changes are not significant."
     )
 
 
@@ -276,7 +276,8 @@ class DescribeRobot(_Body):
     answers: _Answers = {}
     present: bool = Field(default=False, description="Begin with the answers of this robot.")
     diagnose: bool = Field(
-        default=False, description="Check the robot instead, which takes some seconds."
+        default=False,
+        description="Check the robot instead of describing it; this takes some seconds.",
     )
 
 
@@ -352,7 +353,7 @@ class Planned(_Answer):
     """One more for each path."""
     planning: bool
     error: str | None
-    """Why the robot cannot follow it, with the first place by line and coordinates."""
+    """Why the robot cannot follow it; gives line and coordinates of the first such place."""
     plan: str | None
     """The name of the plan for the program `path`."""
     route_m: list[list[float]] | None = None

@@ -26,7 +26,7 @@ from cdpr_rt.service.lease import Lease
 
 _LOOK_S: Final = 0.1
 _AGAIN_S: Final = 1.0
-"""Least time between a request to end and the next, which removes the power immediately."""
+"""Shortest time between a request to end and the next, which removes the power immediately."""
 _END_S: Final = 45.0
 """A procedure that does not end within this time after a request is killed; its drives then stop
 without its heartbeat."""
@@ -199,7 +199,7 @@ class ProcedureRunner:
         self._procedure, self._kind = Procedure(what, (), "", Path(), takes_bus=True), "commission"
         self._client = "the daemon"
         self._number += 1
-        self._note(f"{what}: the loop takes the drives again when it has ended")
+        self._note(f"{what}: the loop takes the drives again when this has ended")
         self._task = asyncio.create_task(self._run(self._procedure, int(self._pid[0])))
         self.end("its service was killed")
 

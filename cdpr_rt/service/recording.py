@@ -278,7 +278,7 @@ class EventDetector:
                 axis = f" of {_name(self._axes, now[4])}" if now[4] >= 0 else ""
                 words[-1] += f" by {_label(Limit, now[3])}{axis}"
         if now[5] and now[5] != before[5]:
-            words.append(f"the operator confirmed, number {now[5]}")
+            words.append(f"the operator confirmed target number {now[5]}")
         return ", ".join(words)
 
 
@@ -558,5 +558,5 @@ def _lasting(status: dict[str, Any]) -> dict[str, Any]:
 
 
 def _text(value: dict[str, Any]) -> bytes:
-    """Return the value as strict JSON, for every content."""
+    """Return the value as strict JSON, whatever it contains."""
     return json.dumps(plain(value), default=str).encode()

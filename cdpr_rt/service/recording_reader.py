@@ -179,7 +179,7 @@ class RecordingReader:
         most = max(_LEAST_BYTES, _MOST_RATIO * self.position)
         if self._held_bytes > most:
             raise RecordingError(
-                f"{self.path}: its first {self.position} bytes contain more than {most}; "
+                f"{self.path}: its first {self.position} bytes expand to more than {most}; "
                 f"allowed: up to {_MOST_RATIO} times as many"
             )
 

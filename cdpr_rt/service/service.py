@@ -342,12 +342,13 @@ class Service:
             what = fields["program"] if do == "program" else do
             self.events.add("command", f"{what} by {client}{result}")
         elif fields["value"] is not None:
-            what = "axis {axis}, {index:04X}h:{sub} to {value}".format(**fields)
-            self.events.add("command", f"object of {what} by {client}{result}")
+            what = "{index:04X}h:{sub} of axis {axis} set to {value}".format(**fields)
+            self.events.add("command", f"object {what} by {client}{result}")
         return reply
 
     def _note_set(self, client: str, wanted: Mapping[str, Any]) -> None:
-        """Note which values a client has changed; an event follows when it changes no more."""
+        """Note which values a client has changed; an event follows when the client stops changing
+        them."""
         program = self.link.status().get("program")
         values = ", ".join(f"{key} {value}" for key, value in wanted.items())
         text = f"set {values} of {program} by {client}"

@@ -280,9 +280,9 @@ def encode(
 ) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
-    `command_offsets` (n, 5) holds frame and first byte of each, and the number of bytes of the
-    torque; `controlwords` (9, 9) the word by
-    target and present state. Returns the alarm bits of all axes.
+    `command_offsets` (n, 5) holds the frame and first byte of each, and the number of bytes of
+    the torque. `controlwords` (9, 9) holds the word for each pair of target and present state.
+    Returns the alarm bits of all axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):

@@ -122,8 +122,8 @@ class GroupLayout:
         self.fields: NDArray[np.int64] = np.zeros((len(axes), codec.MAX_FIELDS, 5), np.int64)
         """By axis, a list of fields: TPDO, target row, first byte, size, signed; size 0 ends it."""
         self.command_offsets: NDArray[np.int64] = np.zeros((len(axes), 5), np.int64)
-        """By axis: row in `rpdos` and first byte, of the controlword and of the target torque, and
-        number of bytes of the latter."""
+        """By axis: row in `rpdos` and first byte of the controlword, the same of the target torque,
+        and the torque's number of bytes."""
         commands = [_command_rpdos(axis.drive) for axis in axes]
         self.rpdos = FrameBuffer(sum(len(pdos) for pdos in commands))
         """The RPDOs of all axes, to be filled and sent each cycle."""

@@ -182,7 +182,7 @@ def _taken(url: BusUrl) -> str:
         except ConnectionRefusedError:
             return ""
         except OSError:
-            return "another process runs the drives on this bus"  # its lock takes no more callers
+            return "another process runs the drives on this bus"  # its queue is full
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
     pid, _, _ = _CREDENTIALS.unpack(credentials)
     return f"process {pid}{_command_of(pid)} runs the drives on this bus; end that process first"

@@ -320,7 +320,7 @@ def read_stamp(network: CanNetwork, node_id: int) -> Stamp | None:
 def store(network: CanNetwork, node_id: int) -> bool:
     """Let the drive store its parameters (1010h:01); return False if it has no such object.
 
-    Raises SdoError if the drive refuses, BusError.
+    Raises BusError, or SdoError if the drive refuses.
     """
     if _STORE not in network.dictionary(node_id):
         return False

@@ -130,7 +130,7 @@ class LssMaster(BusMember):
         self._settle_s = _SETTLE_S
 
     def on_loss(self, error: BusError) -> None:
-        """End transfers and waits with the error."""
+        """End all transfers and all waits with this error."""
         self._lost = error
         for client in self._clients.values():
             client.fail(error)
@@ -154,7 +154,7 @@ class LssMaster(BusMember):
         with suppress(SdoAbortError, SdoTimeoutError):
             self._upload(node_id, 0x1000)
         if node_id in self._answering:  # even if it answers another node
-            return "it answers to SDO"
+            return "it answers SDO requests"
         deadline = self.clock.now_s + listen_s
         while (frame := self._receive(deadline)) is not None:
             if frame[0] == _HEARTBEAT + node_id:

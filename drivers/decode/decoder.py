@@ -192,7 +192,7 @@ _LSS_REQUESTS = {
     **{0x46 + i: f"who has {name} {{number:08X}}h?" for i, name in enumerate(_LSS_RANGES)},
     0x4C: "asks for devices without a node id",
     0x51: "fast scan: {scan}",
-    **{command: f"tell your {name}" for command, name in _LSS_INQUIRE.items()},
+    **{command: f"report your {name}" for command, name in _LSS_INQUIRE.items()},
 }
 _LSS_ANSWERS = {
     0x44: "selected",

@@ -58,7 +58,7 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
     if folder is None:
         return robot
     found = {i: folder / folder_of(axis) for i, axis in enumerate(robot.axes)}
-    # a path that exists but is no file counts as found: reading it reports the error
+    # a path that exists but is not a file counts as found: reading it reports the error
     there = {i: path for i, path in found.items() if os.path.lexists(Paths(path).profile)}
     found = {i: path.resolve() for i, path in there.items()}
     if not found:

@@ -187,7 +187,7 @@ class RobotMachine:
             device.tolerate_silence(self._missed_cycles + 1)
             unsought = self._seek_indices(device)
             if not self.clock.lockstep:
-                # garbage collection blocks every thread: collect now and exempt the remaining
+                # garbage collection blocks every thread: collect now, and exempt what remains
                 # objects
                 gc.collect()
                 gc.freeze()

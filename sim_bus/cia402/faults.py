@@ -243,7 +243,7 @@ class FaultInjection:
         self.board.cell_fault = fault if broken else TensionFault.NONE
 
     def break_io(self, fault: SafetyIoFault, broken: float) -> None:
-        """Give the safety I/O a fault, or mend that."""
+        """Give the safety I/O a fault, or mend it."""
         assert self.board is not None  # the fault needs it
         faults = self.board.io_faults
         self.board.io_faults = faults | fault if broken else faults & ~fault
@@ -419,14 +419,14 @@ _TABLE = (
     # the encoder
     Fault("encoder-jump", "miscounts once; its index pulse stays",
           lambda f, v: f.axis.jump(v), 500, -(2**31), 2**31 - 1, "counts", sub=11, lasts=False),
-    Fault("encoder-frozen", "does not count; `mend` lets it go on from there",
+    Fault("encoder-frozen", "does not count; after `mend` it continues from there",
           lambda f, v: f.axis.freeze_encoder(bool(v))),
     Fault("encoder-noise", "shows noise of this standard deviation",
           lambda f, v: f.set_motor("noise", v or f.axis.plant.encoder.noise_counts),
           20.0, 0.1, 1e4, "counts"),
     Fault("index-missed", "gives no index pulse", lambda f, v: f.axis.miss_index(bool(v))),
     # the bus
-    Fault(SILENCE, "neither receives nor sends; 65535: for good",
+    Fault(SILENCE, "neither receives nor sends; 65535: permanently",
           lambda f, v: f.silence(v), _FOR_GOOD_MS, 1, _FOR_GOOD_MS, "ms", sub=6,
           left=lambda f: f.silence_ms),
     Fault("bus-off", "leaves the bus and reacts as to a lost master", lambda f, v: f.bus_off(v)),
@@ -443,7 +443,7 @@ _TABLE = (
     Fault(_CORRUPTED, "sends this many TPDOs with one wrong bit",
           lambda f, v: f.count(_CORRUPTED, v), 1, 1, 0xFF, "frames",
           left=lambda f: f.counts[_CORRUPTED]),
-    Fault("duplicate-node", "shares its node id with another device, which waits pre-operational",
+    Fault("duplicate-node", "shares its node id with another device, which stays pre-operational",
           lambda f, v: f.double(v)),
     Fault("no-heartbeat", "sends no heartbeat", lambda f, v: f.mute(v), sub=5),
     Fault("heartbeat-late", "sends its next heartbeat this much later",
@@ -460,7 +460,7 @@ _TABLE = (
           100, 1, 0xFFFF, "mm", sub=13, needs="cable", left=lambda f: f.slipped_mm),
     Fault("caught-cable", "is caught at the drum, which cannot turn",
           lambda f, v: f.axis.jam(bool(v)), needs="cable"),
-    Fault(CELL_OFF, "shows this much more than the tension", lambda f, v: f.set_cell_off(v),
+    Fault(CELL_OFF, "shows a tension that is too high by this much", lambda f, v: f.set_cell_off(v),
           40, -(2**15), 2**15 - 1, "N", sub=14, left=lambda f: round(f.axis.cell_off_N)),
     Fault("cell-broken", "its load cell has a broken wire",
           lambda f, v: f.break_cell(TensionFault.BROKEN_WIRE, v), needs="board"),

@@ -2,8 +2,7 @@
 
 There is one record at every SYNC. Some records are written without SYNC, with `NO_SYNC` as number,
 so that the log also shows a motor whose master has died. Records have the little-endian layout
-named in
-the header of their `RecordFile`.
+named in the header of their `RecordFile`.
 """
 
 from __future__ import annotations

@@ -179,7 +179,7 @@ def test_a_path_is_checked_followed_paused_and_continued_by_clicks(
         page.get_by_label("zero y, mm").fill("1500")
         page.get_by_label("scale").fill("0.1")
         press(page, "Plan again")
-        see_plan(page, "The robot can follow it: 0.20 m")
+        see_plan(page, "The robot can follow the path: 0.20 m")
         press(page, "Follow the path")
         page.get_by_text("Following it").wait_for()
         page.get_by_label("Feed").fill("20")

@@ -70,7 +70,7 @@ def test_a_motor_is_commissioned_and_its_report_opens(
     press(page, "Commission lower left")
     page.get_by_text("Slow sweeps").wait_for()
     page.get_by_text("Torque, Nm").wait_for()
-    page.get_by_text("It is finished.").wait_for()
+    page.get_by_text("The procedure is finished.").wait_for()
     page.get_by_role("region", name="Result of lower left").get_by_text("times").first.wait_for()
     with page.expect_popup() as opened:
         page.get_by_role("link", name="Open the report: lower left").click()
@@ -122,7 +122,7 @@ def test_the_geometry_is_measured_judged_and_adopted(
     verdict.get_by_text("Uncertainty, 3 sigma").wait_for()
     page.get_by_role("link", name="Open the report").wait_for()
     assert daemon.status()["program"] == "hold"
-    anyway = verdict.get_by_label("Adopt it although its changes are not significant.")
+    anyway = verdict.get_by_label("Adopt the calibration although its changes are not significant.")
     if anyway.count():
         anyway.check()
         press(page, "Adopt")

@@ -278,7 +278,7 @@ def test_a_slip_of_the_only_carrying_cable_is_detected(tmp_path: Path) -> None:
         end_of_fault(robot)
         assert robot.state is LoopState.FAULT
         told = robot.loop.life.reason
-        assert told.startswith("the cables' lengths suddenly changed against each other by ")
+        assert told.startswith("the cables' lengths suddenly changed relative to each other by ")
         assert "axis 4" in told
 
 

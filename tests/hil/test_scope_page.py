@@ -130,7 +130,7 @@ def test_objects_are_read_and_written_with_consent_without_power_only(
         page.get_by_label("Type 6072 again to agree").fill("6072")
         write.click()
         page.get_by_role("cell", name="4.5000 Nm").wait_for()  # the boot has restored it
-        page.get_by_text("object of axis 1, 6072h:0 to 300").first.wait_for()
+        page.get_by_text("object 6072h:0 of axis 1 set to 300").first.wait_for()
         press(page, "Enable")
         page.get_by_text("Remove the power first").wait_for()
         assert write.is_disabled()

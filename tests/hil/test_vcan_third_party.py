@@ -134,5 +134,5 @@ def test_new_devices_get_node_ids_by_lss() -> None:
         master.set_node_id(9)
         master.release()
         assert master.wait_for_boot_up(9, _LONGEST_S)
-        assert master.node_id_in_use(9) == "it answers to SDO"
+        assert master.node_id_in_use(9) == "it answers SDO requests"
         assert master.node_id_in_use(10, 0.1) == ""

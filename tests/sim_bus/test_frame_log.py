@@ -100,7 +100,7 @@ def test_two_simulators_write_to_different_files(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
     path.write_text("(0000000001.000000) can0 080#\n")
     log = FrameLog(path)
-    with pytest.raises(OSError, match="another simulator writes it"):
+    with pytest.raises(OSError, match="another simulator is writing to it"):
         FrameLog(path)
     log.listener("can0").receive(SYNC, 0.5)
     log.close()

@@ -149,7 +149,7 @@ def test_flaws_are_reported_and_the_copy_is_unchanged(tmp_path: Path) -> None:
     told = imported(path, tmp_path / "out")
     remarks = "\n".join(told["remarks"])
     assert "read as Windows-1252" in remarks
-    assert "[6041]: is there twice" in remarks
+    assert "[6041]: appears twice" in remarks
     assert "[6077] AccessType: value 'readonly'; allowed: ro, wo, rw" in remarks
     assert "[DeviceInfo] BaudRate_10: value 'yes'; allowed: a number" in remarks
     drive = load_drive(tmp_path / "out" / "odd.toml")
@@ -379,7 +379,7 @@ def test_a_drive_whose_pdo_maps_cannot_contain_torque_is_rejected(tmp_path: Path
     for number in range(4):
         fixed = with_key(f"140{number}sub2", "AccessType", "ro", fixed)
     told = refused(fixed, tmp_path)
-    assert "[1403sub2] AccessType does not let transmission type 1 (every SYNC) be written" in told
+    assert "[1403sub2] AccessType does not allow writing transmission type 1 (every SYNC)" in told
     assert "; [6071] PDOMapping is not 1" in told
     for number in range(4):
         text = with_key(f"160{number}sub0", "AccessType", "ro", text)

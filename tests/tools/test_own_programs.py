@@ -128,12 +128,12 @@ def test_time_waits_for_a_target_that_is_too_fast(robot: cdpr.Robot) -> None:
         assert np.abs(speed_m_s).max() < 0.6
 
 
-def test_what_is_no_program_and_no_distribution_is_an_invalid_argument() -> None:
-    with pytest.raises(cdpr.InvalidArgument, match=r"programs\[0\]: is no program; derive it"):
+def test_an_object_that_is_no_program_or_distribution_is_rejected() -> None:
+    with pytest.raises(cdpr.InvalidArgument, match=r"programs\[0\]: is not a program; derive it"):
         cdpr.simulate("planar-3", programs=[Swing])  # type: ignore[list-item]
     for wrong in ("mine.py:spread", Swing):
         for use in (cdpr.simulate, cdpr.load):
-            with pytest.raises(cdpr.InvalidArgument, match="is no function f"):
+            with pytest.raises(cdpr.InvalidArgument, match="is not a function f"):
                 use("planar-3", tension_distribution=wrong)  # type: ignore[operator]
 
 
@@ -147,7 +147,7 @@ class Named(Swing):
 @pytest.mark.parametrize(
     ("program", "text"),
     [
-        (Swing, "mine: is no program; derive it from cdpr_rt.Program"),
+        (Swing, "mine: is not a program; derive it from cdpr_rt.Program"),
         (Named("pose"), "mine: name: 'pose' is taken"),
         (Named("Big Swing"), "mine: name: 'Big Swing'; allowed: small letters"),
         (Named(None), "mine: name: None; allowed"),

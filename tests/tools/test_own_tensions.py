@@ -154,7 +154,7 @@ def test_a_robots_file_may_name_what_an_installed_package_registers(
         (["--tension-distribution", "mine.py:missing"], "--tension-distribution mine.py:missing:"),
         (
             ["--tension-distribution", "math:pi"],
-            "math:pi: 3.141592653589793 is no function f(W, w, low,",
+            "math:pi: 3.141592653589793 is not a function f(W, w, low,",
         ),
         (["--control", "mine.py:spread", "--allow-code"], "with --tension-distribution"),
     ],

@@ -185,7 +185,7 @@ def test_the_first_difference_is_reported(tmp_path: Path) -> None:
         "sweep.raw": "runs 1 and 3: byte 70000",
         "short.raw": "runs 1 and 3: byte 100",
         "run.json": "runs 1 and 3: a.b[1]: 1.0 | 2.0",
-        "frames.log": "runs 1 and 3: line 5: the second has no more",
+        "frames.log": "runs 1 and 3: line 5: the second file has already ended",
         "more.json": "run 1 did not write it",
         "bad.json": "in run 1: cannot be read: Expecting property name enclosed in double quotes: "
         "line 1 column 2 (char 1)",
@@ -216,7 +216,7 @@ def recording(path: Path, log_time: int, torque: float, events: int) -> None:
     [
         (0.0, 2, ""),
         (0.5, 2, "runs 1 and 2: /cycle, message 4: torque_sent_Nm[1]: 0.0 | 0.5"),
-        (0.0, 1, "runs 1 and 2: /events, message 2: the second has no more"),
+        (0.0, 1, "runs 1 and 2: /events, message 2: the second file has already ended"),
     ],
 )
 def test_recordings_are_compared_without_wall_clock_times(

@@ -126,8 +126,8 @@ def measure(starts: int, cycles: int, seconds: float, out: Output) -> Figures:
             f"in a daemon at {1.0 / PACED_PERIOD_S:g} Hz, the platform in motion: us a cycle, "
             "and the distance from the set-point",
             table_of(paced),
-            "seconds from `import cdpr_rt` until the robot is ready, its first move begins and has "
-            "ended; processor time of all processes",
+            "seconds from `import cdpr_rt` until the robot is ready, until its first move begins, "
+            "and until this move has ended; processor time of all processes",
             table_of(started),
         ],
         more={"starts": started, "paced": paced, "cycles": cycles, "seconds": seconds},

@@ -39,7 +39,7 @@ def measure(cycles: int, out: Output) -> Figures:
     frames: dict[str, list[int]] = {}
     with _ways(out) as (bus, ways):
         # no progress bar: its drawing thread would be measured too
-        out.note(f"{cycles} exchanges of each of {len(ways)} ways; 10000 take some seconds ...")
+        out.note(f"{cycles} exchanges with each of {len(ways)} libraries; 10000 take seconds ...")
         counted = {
             name: _counted(way, bus, frames.setdefault(name, [0, 0])) for name, way in ways.items()
         }

@@ -184,11 +184,11 @@ def press_stops(count: int, out: Output) -> Figures:
         for case, row in rows.items()
     }
     return Figures(
-        f"{count} presses each of the page's stop in Chromium, until the drives have answered, ms; "
-        f"{len(os.sched_getaffinity(0))} processors",
+        f"time in ms from a press of the page's stop in Chromium to the drives' answer, {count} "
+        f"presses each; {len(os.sched_getaffinity(0))} processors",
         rows,
         targets,
-        notes=[f"{_OTHERS} of the 20 pages are connections that read what a page reads"],
+        notes=[f"{_OTHERS} of the 20 pages are plain connections that read like a page"],
         more={"presses": count},
     )
 
@@ -210,7 +210,7 @@ def _answered_ms(log: Any, pressed_s: float) -> float:
     programs = log["program"][first:]
     after = np.flatnonzero(programs != programs[0])
     if not after.size:
-        raise WorkFailedError("a press of the page's stop has stopped nothing")
+        raise WorkFailedError("a press of the page's stop did not stop the robot")
     row = log[first + int(after[0]) + 1]
     return 1e3 * (1e-9 * float(row["stamp_ns"]) + float(row["exchange_s"]) - pressed_s)
 
@@ -262,15 +262,22 @@ def measure(seconds: float, hours: float, out: Output) -> Figures:
         "times in us",
         rows,
         {
-            "shown": Target("the page shows the robot after, median, ms", shown_ms, 1000.0),
+            "shown": Target("time until the page shows the robot, median, ms", shown_ms, 1000.0),
             "rate": Target("cycles a second in one page", rate, 0.9 * RATE_Hz, at_least=True),
             "share": Target("one page, % of a processor", share, 10.0),
             "loop": Target("computing p99.9, 50 pages / nobody", ratio, 1.1),
-            "kept": Target("pages that read and stay", watching, _MANY + 1 - _SLOW, at_least=True),
-            "dropped": Target("pages left at the end", watching, _MANY + 1 - _SLOW),
+            "kept": Target(
+                "pages that read, still connected",
+                watching,
+                _MANY + 1 - _SLOW,
+                at_least=True,
+            ),
+            "dropped": Target("all pages still connected", watching, _MANY + 1 - _SLOW),
             "memory": Target(f"growth of a page over {hours:g} h, MB", growth, 50.0),
         },
-        notes=[f"{_MANY} of 50 pages are connections that read as a page does; {_SLOW} never read"],
+        notes=[
+            f"{_MANY} of 50 pages are plain connections that read like a page; {_SLOW} never read"
+        ],
         more={"opened_ms": opened_ms, "seconds": seconds, "hours": hours},
     )
 

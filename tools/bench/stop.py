@@ -48,7 +48,7 @@ def measure(stops: int, out: Output, *, from_page: bool = False) -> Figures:
         return press_stops(stops, out)
     rows: dict[str, Row] = {}
     sent: Counter[str] = Counter()
-    cases = {"nobody else asks": 0, "flooded": _CLIENTS}
+    cases = {"no other requests": 0, "flooded": _CLIENTS}
     with (
         tempfile.TemporaryDirectory(prefix="cdpr-bench-") as name,
         _daemon(Path(name)) as (target, asks),

@@ -188,7 +188,7 @@ class Summary:
                 f"{self.missed} frames were lost because the bus was faster than the monitor"
             )
         if self.led:
-            lines.append("a master leads this bus: only its packets move bus time")
+            lines.append("a master leads this bus: bus time advances only with its packets")
         if self._by_id:
             lines.append(f"{'id':>8} {'node':>5}  {'what':<10}{'frames':>9}{'per s':>10}")
         for row in self.rows():

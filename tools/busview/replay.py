@@ -38,7 +38,7 @@ def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
     """Yield the frames of one bus in a file; `-` is standard input.
 
     Candump files are read by this package, others (.asc, .blf, .trc, ...) by python-can.
-    Raises BadInputError for a file that cannot be read or contains several buses, LogError.
+    Raises LogError, or BadInputError for a file that cannot be read or contains several buses.
     """
     read_channel = channel
     there: set[str] = set()

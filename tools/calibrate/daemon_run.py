@@ -208,15 +208,13 @@ def lines(robot: Robot, data: CalibrationData) -> list[str]:
     if reading.image is not None:
         said[0] += f"; {len(reading.image.markers)} markers in the image"
     if data.restarts and data.restarts[-1] == len(data.poses) - 1:
-        said.append(
-            "lengths count from a new zero since the pose before: these have separate offsets"
-        )
+        said.append("the zero of the lengths changed since the previous pose: they get new offsets")
     return said
 
 
 def going_on(kept: DaemonPoses) -> AbstractContextManager[None]:
     """Add to any error of the block how to continue; see `saying_how_to_continue`."""
-    return run.saying_how_to_continue(kept, "the same command continues after them")
+    return run.saying_how_to_continue(kept, "the same command continues after these poses")
 
 
 # Ask a person for the measured position while the platform stands; store it in a file of points.
@@ -303,8 +301,8 @@ class AskedPoints:
         while True:
             # the person who measures stands beside a robot that moves after the answer
             self._out.note(
-                f"pose {pose} stands: type the measured {names} in mm [and sigma], or press "
-                "Enter to skip; leave the workspace first, because the robot moves on:"
+                f"the platform stands at pose {pose}: type the measured {names} in mm [and sigma], "
+                "or press Enter to skip; leave the workspace first, because the robot moves on:"
             )
             words = self._line(pose, origin_m).split()
             if not words:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _PICTURE, _REPORT, _IMAGES = "calibration.png", "calibration.html", "images"
 _LEAST_JUDGED = 20
 _LITTLE = 0.1
-"""Least relative gain for which ten more poses are worth the time."""
+"""Smallest relative gain for which ten more poses are worth the time."""
 
 CompareWithTruth = Callable[[Outcome], "TruthComparison"]
 """Compares an outcome with the truth that a simulator knows."""
@@ -182,7 +182,7 @@ def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
     if dry_run:
         return "--dry-run"
     if not outcome.good:
-        return "it is not good"
+        return "the calibration is not good"
     if outcome.adopt or outcome.differs_from_file:
         return None
     if outcome.worse:
@@ -261,7 +261,7 @@ def _take_over(
 
 
 def distrust_again(robot: Robot) -> None:
-    """Mark the robot as not calibrated again if it was so before the calibration in force."""
+    """Mark the robot as not calibrated if it was not before the calibration in force."""
     try:
         known = in_force(robot)
     except ProfileError:

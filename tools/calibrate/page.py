@@ -127,7 +127,7 @@ def _held_out(
     ax.autoscale_view()
     if not labelled:
         return
-    label = f"true error of a pose not used: {1e3 * size_m:g} mm"
+    label = f"true error of a held-out pose: {1e3 * size_m:g} mm"
     ax.quiverkey(arrows, 0.1, 1.06, size_m, label, labelpos="E")
 
 
@@ -140,12 +140,12 @@ def held_out_figure(comparison: TruthComparison) -> Figure:
         (axes[0], "position_m", 1e3, "mm"), (axes[1], "turn_rad", np.degrees(1.0), "deg"),
     ):  # fmt: skip
         for errors, label, colour, shift in (
-            (before, "by the robot's file", style.COLOURS["none"], -0.2),
+            (before, "according to the robot's file", style.COLOURS["none"], -0.2),
             (after, "calibrated", style.COLOURS["harmonic"], 0.2),
         ):
             size = scale * np.linalg.norm(getattr(errors, key), axis=1)
             ax.bar(numbers + shift, size, 0.4, color=colour, label=label if ax is axes[0] else None)
-        ax.set(xlabel="pose not used", ylabel=f"error by the scanner ({unit})")
+        ax.set(xlabel="held-out pose", ylabel=f"error according to the scanner ({unit})")
         ax.set_xticks(numbers, [str(j + 1) for j in comparison.index], rotation=90)
     style.legend_above(figure, axes[0])
     return figure

@@ -108,7 +108,7 @@ class CalibrationRunSettings(Profile):
             if (places is None) != (self.places is None):
                 kind = "a list of poses" if self.places is not None else "no list of poses"
                 raise BadInputError(
-                    f"--poses: the run to be continued began with {kind}; give that again"
+                    f"--poses: the run to be continued began with {kind}; give the same again"
                 )
             update |= {"poses": poses, "places": places}
         return self.model_copy(update=update)
@@ -120,7 +120,7 @@ class CalibrationRunSettings(Profile):
 
 
 StopCriterion = Callable[[CalibrationData], str | None]
-"""Called after each batch; returns why no more poses are needed, None if more are."""
+"""Called after each batch; returns why the poses suffice, None if more are needed."""
 
 
 def no_poses(robot: Robot, simulated: bool, camera: CameraSetup | None = None) -> CalibrationData:
@@ -488,7 +488,7 @@ _METRES: Final = 300.0
 
 
 def points_of(path: Path, robot: Robot) -> list[MeasuredPoint]:
-    """Return the points of a file; raises BadInputError if the user typed metres, ProfileError."""
+    """Return the points of a file; raises ProfileError, or BadInputError for values in metres."""
     points, platform = load_points(path), robot.platform
     assert platform is not None  # callers have checked it
     box_m = np.abs([platform.workspace_min_m, platform.workspace_max_m])

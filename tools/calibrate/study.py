@@ -319,10 +319,10 @@ def lines(rows: Rows) -> list[str]:
         shown += [TableText([[title, "e(a) mm", "e(rho_0) mm", "ratio", "model"], *cells]), ""]
     for one in plateaus(rows):
         shown.append(
-            f"figure {one['figure']}: of e(a) {one['floor_exit_mm']:.2f} mm, of e(rho_0) "
-            f"{one['floor_offset_mm']:.2f} mm remain at any number of poses; noise has the "
-            "same effect at "
-            f"{_count(one['exit_poses'])} and {_count(one['offset_poses'])} poses"
+            f"figure {one['figure']}: {one['floor_exit_mm']:.2f} mm of e(a) and "
+            f"{one['floor_offset_mm']:.2f} mm of e(rho_0) remain at any number of poses; noise has "
+            f"the same effect at {_count(one['exit_poses'])} and {_count(one['offset_poses'])} "
+            "poses"
         )
     return shown
 

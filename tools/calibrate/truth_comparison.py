@@ -120,7 +120,7 @@ class TruthComparison:
             if errors is not None:
                 figures = errors.as_json()
                 lines.append(
-                    f"poses not used against {what}: mean "
+                    f"poses that the fit has not used, against {what}: mean "
                     f"{figures['mean_position_error_mm']:.2f} mm and "
                     f"{figures['mean_orientation_error_deg']:.3f} deg, worst "
                     f"{figures['worst_position_error_mm']:.2f} mm and "
@@ -130,8 +130,8 @@ class TruthComparison:
         far_mm, turned_deg = 1e3 * self.scanner_alone[0], np.degrees(self.scanner_alone[1])
         lines.insert(
             1,
-            f"the scanner's own errors alone make {far_mm:.2f} mm and {turned_deg:.3f} deg "
-            "of that on average",
+            f"on average, {far_mm:.2f} mm and {turned_deg:.3f} deg of that are errors of the "
+            "scanner itself",
         )
         return lines
 

@@ -79,7 +79,9 @@ def shrunk(scenario: Scenario, note: Callable[[str], None]) -> Scenario:
     """
     (found,) = _violated([scenario])
     if not found:
-        raise WorkFailedError(f"seed {scenario.seed}: nothing to shrink: it violates nothing")
+        raise WorkFailedError(
+            f"seed {scenario.seed}: nothing to shrink: the scenario violates nothing"
+        )
     wanted = found[0]
     note(f"{wanted}: {len(scenario.actions)} actions, {len(scenario.faults)} faults")
     scenario = _first_failing(
@@ -166,7 +168,7 @@ def summary(results: Sequence[Result]) -> list[str]:
     )
     failing = sum(bool(result.violations) for result in results)
     cpu_s = sum(result.cpu_s for result in results)
-    pace = f", {3600.0 * len(results) / cpu_s:.0f} an hour and core" if cpu_s else ""
+    pace = f", {3600.0 * len(results) / cpu_s:.0f} per hour and core" if cpu_s else ""
     return [
         *(f"{count} seeds: {text}" for text, count in unstarted.items()),
         f"{len(results)} seeds, {failing} failing{pace}",

@@ -309,7 +309,7 @@ def causes_are_true(j: Judge) -> Iterator[str]:
         if not is_cause or any(stall_s <= at_s for stall_s in stalls):
             continue
         if not any(cause.at_s <= at_s and cause.explains(fault) for cause in j.causes):
-            yield f"the cause is not true: {fault['text']}"
+            yield f"the reported cause is wrong: {fault['text']}"
 
 
 def causes_are_named(j: Judge) -> Iterator[str]:

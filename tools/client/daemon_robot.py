@@ -566,5 +566,5 @@ class _DaemonProcess:
     def _last_error(self) -> str:
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
-        causes = [line.removeprefix("cdpr: ") for line in lines if "could not begin" not in line]
+        causes = [line.removeprefix("cdpr: ") for line in lines if "could not start" not in line]
         return (causes or lines or ["the daemon ended"])[-1]

@@ -50,7 +50,7 @@ def follow(
         body["line"] = line
         number = daemon.post("/path", body)["number"]
         rest = f"`cdpr path run {file} --line {line}`"
-        later = f"the path from line {line} on is still to do; next: {rest}"
+        later = f"the path from line {line} on has not been followed yet; next: {rest}"
         lasts = _run(daemon, out, arguments, later, planned_s=duration_s)
         if lasts:
             out.note(f"{file.name}: continues with line {line}")
@@ -88,7 +88,9 @@ def _planned(daemon: Daemon, body: dict[str, Any], number: int) -> dict[str, Any
         while True:
             job = daemon.get("/path")
             if job["number"] != number:
-                raise WorkFailedError(f"{body['name']}: another client has planned a path")
+                raise WorkFailedError(
+                    f"{body['name']}: another client has planned a path meanwhile"
+                )
             if not job["planning"]:
                 break
             if stop_requested():

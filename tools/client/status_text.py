@@ -108,7 +108,7 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     if state != DEAD and silent_s > _SILENT_s:
         lines.append(
             Text(
-                f"the loop has run no cycle for {silent_s:.1f} s: the following is that old",
+                f"the loop has run no cycle for {silent_s:.1f} s: the values below are that old",
                 style="red",
             )
         )
@@ -309,7 +309,9 @@ def put_back_text(status: dict[str, Any]) -> str:
     """Return how to carry a simulated platform home after a fall; "" if it has not fallen."""
     if not (is_simulated(status) and (status.get("last_stop") or {}).get("fallen")):
         return ""
-    return f"`cdpr sim fault {status['robot']} put-back` carries the platform back to its start"
+    return (
+        f"`cdpr sim fault {status['robot']} put-back` carries the platform back to its start pose"
+    )
 
 
 _SLOW: Final = 0.9

@@ -40,7 +40,7 @@ def _run(bench: str, as_json: bool, **given: Any) -> None:
 
 @app.command()
 def api(
-    starts: Annotated[int, option("First moves of a new script.", min=1)] = 5,
+    starts: Annotated[int, option("Number of new scripts; each makes its first move.", min=1)] = 5,
     cycles: Annotated[int, option("Cycles in lockstep with each controller.", min=200)] = 4_000,
     seconds: Annotated[
         float, option("Duration at 250 Hz with each controller.", min=3, max=3600)
@@ -58,7 +58,9 @@ def api(
 
 @app.command()
 def bus(
-    exchanges: Annotated[int, option("Exchanges of 8 frames out and 8 in, each way.", min=1)] = 500,
+    exchanges: Annotated[
+        int, option("Exchanges with each library, 8 frames out and 8 in.", min=1)
+    ] = 500,
     as_json: JsonOption = False,
 ) -> None:
     """Measure frames per second and host cost per frame, beside plain python-can.
@@ -85,7 +87,7 @@ def control(
 
 @app.command()
 def cycle(
-    cycles: Annotated[int, option("Exchanges each way.", min=1)] = 10_000,
+    cycles: Annotated[int, option("Exchanges with each library.", min=1)] = 10_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure one exchange with 8 axes: ours, and the canopen package's PDO path.
@@ -146,7 +148,9 @@ def loop(
 @app.command()
 def page(
     seconds: Annotated[float, option("Duration of each case.", min=3, max=3600)] = 60.0,
-    hours: Annotated[float, option("Hours of messages that a page gets.", min=0.1, max=1000)] = 8.0,
+    hours: Annotated[
+        float, option("Hours of messages to send to a page.", min=0.1, max=1000)
+    ] = 8.0,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the robot's page in Chromium: start, rate, cost, 50 open pages, memory.
@@ -161,11 +165,16 @@ def soak(
     hours: Annotated[float, option("Hours of bus time.", min=1e-4, max=1e4)] = 1.0,
     wall_minutes: Annotated[
         float,
-        option("End after this many minutes, even before --hours.", min=0.01, show_default=False),
+        option(
+            "End after this many minutes, even if --hours are not over.",
+            min=0.01,
+            show_default=False,
+        ),
     ] = math.inf,
     robot: Annotated[str, option("Robot profile: a name or a path.")] = "bench-8",
     rate: Annotated[
-        float | None, option("Cycles per second, instead of the robot's.", min=1, max=10_000)
+        float | None,
+        option("Cycles per second; default: as in the robot's file.", min=1, max=10_000),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -119,7 +119,7 @@ def replay(
     robot: _RobotOption = None,
     ids: _IdsOption = None,
     channel: Annotated[
-        str | None, option("Which bus, if the file contains several.", "--channel")
+        str | None, option("Bus to replay, if the file contains several.", "--channel")
     ] = None,
     speed: Annotated[
         float | None,
@@ -236,9 +236,9 @@ def _visit(
         scan_.listen(LISTEN_S)
         if scan_.traffic.sdo_requests and not force:
             raise WorkFailedError(
-                f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: it "
-                "would also get the answers to our requests, during its transfers; wait until "
-                "it has finished, or use --force"
+                f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: it would "
+                "also receive our answers during its transfers; wait until it has finished, or use "
+                "--force"
             )
         scan_.ask()
     signs = signs_of_a_master(scan_.traffic)
@@ -259,7 +259,7 @@ _LOW, _HIGH = 1.0, 10_000.0
 def budget(
     machine: options.RobotOrWinchArgument,
     rate: Annotated[
-        float | None, option("Cycles per second, instead of the profile's.", min=_LOW, max=_HIGH)
+        float | None, option("Cycles per second; default: as in the profile.", min=_LOW, max=_HIGH)
     ] = None,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -329,5 +329,5 @@ def _explanation(b: BusBudget) -> str:
     )
     if b.changes_s and math.isfinite(b.recovery_cycles):
         cycles = f"{b.recovery_cycles:.0f} cycle{'s' if b.recovery_cycles > 1 else ''}"
-        text += f", and a change in every drive is seen within {cycles}"
+        text += f", and the master sees changes in all drives within {cycles}"
     return text + f"; SYNC may come up to {b.longest_wait_s * _US:.0f} us late"

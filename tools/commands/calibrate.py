@@ -55,8 +55,7 @@ KnownMmOption = Annotated[
 KnownDrumOption = Annotated[
     float | None,
     option(
-        "Standard deviation of the cable that a turn of a drum pays out by its file, %; "
-        "default 0.5.",
+        "Standard deviation of the drums' circumference in the robot's file, %; default 0.5.",
         "--known-drum-percent",
         min=0.001,
         max=50.0,
@@ -65,7 +64,7 @@ KnownDrumOption = Annotated[
 LengthNoiseOption = Annotated[
     float | None,
     option(
-        "Standard deviation of a cable length by its encoder, mm; default: estimated from the "
+        "Standard deviation of a cable length from its encoder, mm; default: estimated from the "
         "data, at least 0.3.",
         "--length-noise-mm",
         min=0.001,
@@ -87,7 +86,7 @@ CalibrationPlantOption = Annotated[
 ]
 DryRunOption = Annotated[bool, option("Report the result; adopt nothing.", "--dry-run")]
 AdoptOption = Annotated[
-    bool, option("Adopt it even if its changes are not significant.", "--adopt")
+    bool, option("Adopt the calibration even if its changes are not significant.", "--adopt")
 ]
 PosesOption = Annotated[
     str | None,
@@ -442,7 +441,7 @@ def _require_as_begun(given: Mapping[str, object]) -> None:
     for name, value in given.items():
         if value:
             raise BadInputError(
-                f"{name}: not with --resume, which continues with the options of the run"
+                f"{name}: not together with --resume, which continues with the options of the run"
             )
 
 
@@ -475,7 +474,8 @@ def check(
     running: Annotated[
         bool,
         option(
-            "Check the robot that a daemon runs; its platform must be tight and at home.",
+            "Check the robot that a daemon runs; its cables must be tight and its platform at "
+            "home.",
             "--running",
         ),
     ] = False,

@@ -150,4 +150,4 @@ def _tell(out: Output, fit: IntrinsicsFit) -> None:
     out.say(*(f"left out: {line}" for line in fit.left_out))
     out.say(*(f"missing: {line}" for line in fit.missing))
     if not fit.missing:
-        out.say("the images are enough")
+        out.say("no more images are needed")

@@ -169,10 +169,10 @@ def compare_runs(
             name: comparison.explained(curves[name][run.direction], run)
             for name in comparison.CURVES
         }
-        own = " (identified from it)" if run in used else ""
+        own = " (used for the identification)" if run in used else ""
         rows.append([f"{run.path}{own}", *(f"{r2:.4f}" for r2 in by_method.values())])
         results.append({"recording": str(run.path), "identified_from": bool(own), "r2": by_method})
-    out.say("R2 of the torque, friction's mean left out", TableText(rows, left=["recording"]))
+    out.say("R2 of the torque without its mean friction", TableText(rows, left=["recording"]))
     out.result({"ok": True, "runs": results})
 
 

@@ -190,7 +190,7 @@ def move(
     to: Annotated[
         str | None,
         option(
-            "The platform to this position, in mm, or to a pose that the robot's file names.",
+            "Move the platform to this position, in mm, or to a pose that the robot's file names.",
             metavar="X Y [Z] | NAME",
         ),
     ] = None,
@@ -202,19 +202,24 @@ def move(
             metavar="RX RY RZ | ANGLE",
         ),
     ] = None,
-    relative: Annotated[bool, option("Relative to the present position.", "--relative")] = False,
+    relative: Annotated[
+        bool, option("Move relative to the present position.", "--relative")
+    ] = False,
     frame: Annotated[
         ReferenceFrame,
         option("With --relative: the axes along and about which the platform moves."),
     ] = ReferenceFrame.ROOM,
     cable: Annotated[
-        bool, option("Relative, in mm of cable; positive pays out.", "--cable")
+        bool,
+        option(
+            "Move relative to the present position, in mm of cable; positive pays out.", "--cable"
+        ),
     ] = False,
     speed: Annotated[
         float | None,
         option(
-            "Top speed: deg/s at the motor, or mm/s of a platform, whose rotation slows "
-            "down in proportion.",
+            "Top speed: deg/s at the motor, or mm/s of a platform; its rotation is slowed down in "
+            "proportion.",
             min=0.01,
         ),
     ] = None,
@@ -349,9 +354,9 @@ def tighten(
     source: Annotated[
         LengthSource | None,
         option(
-            "Source of the cable lengths: the platform stands at home, the lengths of the "
-            "last stop, or the lengths that the daemon knows. Default: what it knows, else "
-            "home.",
+            "Source of the cable lengths: home (the platform stands there), the lengths of the "
+            "last stop, or the lengths that the daemon knows. Default: these, or home if it knows "
+            "none.",
             "--from",
         ),
     ] = None,
@@ -370,7 +375,7 @@ def lower(
     daemon: Daemon,
     out: Output,
     blind: Annotated[
-        bool, option("Every winch pays out its cable, wherever that leads.", "--blind")
+        bool, option("Pay out all cables, even if the platform's pose may be wrong.", "--blind")
     ] = False,
 ) -> None:
     """Lower the platform onto its stand and slacken the cables; the power stays on."""

@@ -33,7 +33,8 @@ def doctor(
     compile_all: Annotated[
         bool,
         option(
-            "Only compile all numeric kernels. This takes minutes, and no command does it later.",
+            "Only compile all numeric kernels. This takes minutes; later commands then start "
+            "without compiling.",
             "--compile",
         ),
     ] = False,

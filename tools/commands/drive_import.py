@@ -34,7 +34,7 @@ _BITS = {
     **{0x6040: (16,), 0x6071: (16, 32), 0x6041: (16,), 0x6064: (32,), 0x6077: (16, 32)},
     **{_MODE_SHOWN: (8,), _PROBE_STATUS: (16,), _PROBE_POSITION: (32,)},
 }
-"""Sizes of the objects exchanged in a cycle; torques with 32 bits are not of CiA 402."""
+"""Sizes of the objects exchanged in a cycle; a torque with 32 bits deviates from CiA 402."""
 _HARMLESS = (*_COMMAND, 0x60B2)
 """Objects allowed in a mapped RPDO; except for the commands, they are sent as zero each cycle."""
 _MOST_PDOS = 512
@@ -213,7 +213,7 @@ _TOPICS = {
     ),
     "slope": Unknown(
         "torque_slope_Nm_s (6087h)",
-        "in PT the torque follows a ramp, which is a lag in the loop",
+        "in PT the torque follows a ramp, which delays the control loop",
         "the steepest slope that 6087h accepts: manual, or upper limit in the EDS",
     ),
     "homing": Unknown(
@@ -251,7 +251,7 @@ _TOPICS = {
     ),
     "quirks": Unknown(
         "quirks: halt before a change of mode, homing without bit 10",
-        "drives differ from the standard there",
+        "drives deviate from the standard in these points",
         "manual; the command reports a mode that is never confirmed",
     ),
     "rated_torque": Unknown(
@@ -301,7 +301,11 @@ _MAKERS = {
         "rated_torque_unit": ("uNm", _MANUAL, "maxon: Motor rated torque of the EPOS4 is in uNm")
     },
     0x00000286: {
-        "torque_unit": ("mA_rms", _ASSUMED, "Trinamic: current in mA; mA_peak gives 1.4 times more")
+        "torque_unit": (
+            "mA_rms",
+            _ASSUMED,
+            "Trinamic: mA, taken as rms; with mA_peak, commands are 1.4 times higher",
+        )
     },
 }
 """Keys that hold for all drives of a maker, by vendor id."""
@@ -354,7 +358,7 @@ def propose(eds: DataSheet) -> Proposal:
     for index, why in _CONSEQUENCES.items():
         if index not in eds.od.indices:
             what = f"{index:04X}h is not in the EDS"
-            made.unknown.append(Unknown(what, why, "ask the maker, or a newer EDS"))
+            made.unknown.append(Unknown(what, why, "ask the maker, or get a newer EDS"))
     return made
 
 
@@ -387,7 +391,9 @@ def _identity(made: Proposal, eds: DataSheet) -> None:
     ):
         in_identity = _number(eds, 0x1018, sub)
         if in_identity and declared and in_identity != declared:
-            problem = f"value {declared:#x}, but 1018h:{sub} is {in_identity:#x}, which counts"
+            problem = (
+                f"value {declared:#x}, but 1018h:{sub} is {in_identity:#x}, which takes precedence"
+            )
             eds.remarks.add(f"[DeviceInfo] {name}", problem)
         value = in_identity or declared or 0
         if not 0 <= value <= 0xFFFFFFFF:
@@ -396,7 +402,7 @@ def _identity(made: Proposal, eds: DataSheet) -> None:
         if value:
             made.set(key, value, _MANUAL, source)
         else:
-            made.set(key, value, _ASSUMED, "the EDS does not give it")
+            made.set(key, value, _ASSUMED, "the EDS does not contain it")
             made.find_out(key)
     if made.table["revision"]:
         made.find_out("firmware")
@@ -443,7 +449,7 @@ def _torque_slope(made: Proposal, eds: DataSheet) -> None:
     slope, rated_mNm = eds.get(0x6087), _number(eds, 0x6076)
     if slope is not None and slope.max and rated_mNm and slope.max < 0xFFFFFFFF:
         steepest = slope.max * 1e-3 * rated_mNm * 1e-3
-        how = "upper limit of 6087h by the default of 6076h in the EDS"
+        how = "upper limit of 6087h, with the default of 6076h in the EDS"
         made.set("torque_slope_Nm_s", round(steepest, 3), _MANUAL, how)
     else:
         how = "steep enough to have no effect"
@@ -477,7 +483,7 @@ def _homing(made: Proposal, eds: DataSheet) -> None:
 def _pdos(made: Proposal, eds: DataSheet) -> None:
     rpdos, tpdos = _choose_rpdos(eds), _choose_tpdos(eds)
     for key, choice in (("rpdos", rpdos), ("tpdos", tpdos)):
-        status = _MANUAL if choice.how.startswith("map by default") else _ASSUMED
+        status = _MANUAL if choice.how.startswith("default map") else _ASSUMED
         made.set(key, choice.pdos, status, choice.how)
         if status == _ASSUMED:
             what, why = f"{key}: {choice.how}", "a drive may reject a map that its EDS allows"
@@ -583,7 +589,7 @@ def _choose(
     usable = [offer for offer in offers if offer.serves(_EVERY_SYNC)]
     for offer in usable:
         if offer in as_they_are and offer.holds(objects):
-            return _Choice([offer.table(offer.entries, _EVERY_SYNC)], "map by default in the EDS")
+            return _Choice([offer.table(offer.entries, _EVERY_SYNC)], "default map in the EDS")
     blocked = [index for index in objects if not _mappable(eds, index)]
     for offer in usable:
         whole = _whole(eds, objects[: offer.room]) if not blocked else []
@@ -622,8 +628,8 @@ def _reason(
         places = ", ".join(f"[{first + one.number - 1:04X}sub2]" for one in offers[:_MOST_NAMED])
         value = offers[0].transmission_type
         reasons.append(
-            f"{places} AccessType does not let transmission type 1 (every SYNC) be written "
-            f"in place of {value}"
+            f"{places} AccessType does not allow writing transmission type 1 (every SYNC) in place "
+            f"of {value}"
         )
     if blocked:
         names = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)

@@ -89,7 +89,7 @@ def lss(
     ] = None,
     serial: Annotated[int | None, option("Its serial number.", min=0)] = None,
     alone: Annotated[
-        bool, option("It is the only device on the bus: no search.", "--alone")
+        bool, option("Set the only device on the bus, without a search.", "--alone")
     ] = False,
     node_id: Annotated[int | None, option("Node id to give it.", min=1, max=127)] = None,
     bitrate: Annotated[
@@ -97,10 +97,13 @@ def lss(
     ] = None,
     activate: Annotated[
         bool,
-        option("Change the bit rate immediately; you must change that of the bus.", "--activate"),
+        option(
+            "Change the bit rate immediately; change the bit rate of the bus at the same time.",
+            "--activate",
+        ),
     ] = False,
     switch_delay_ms: Annotated[
-        int, option("Silence before and after --activate.", min=1, max=30_000)
+        int, option("Duration of silence before and after --activate.", min=1, max=30_000)
     ] = 1000,
     store: Annotated[bool, option("Store it in the device.", "--store/--no-store")] = (True),
     timeout_ms: Annotated[
@@ -251,7 +254,7 @@ def _check_power(master: LssMaster, node_id: int) -> None:
             return  # no drive
         reason = str(error)
     except SdoTimeoutError:
-        reason = "no answer to SDO; stopped? Switch it off and on first"
+        reason = "it does not answer SDO requests and may be stopped; switch it off and on first"
     else:
         if state in POWER_OFF:
             return
@@ -291,9 +294,9 @@ def _restart(master: LssMaster, device: _Device, new: int, out: Output) -> None:
         master.reset_communication(old)
     if old != new and not master.wait_for_boot_up(new):
         raise WorkFailedError(
-            f"no boot-up message of node {new} came; switch the drive off and on, then look again"
+            f"node {new} sent no boot-up message; switch the drive off and on, then check again"
         )
-    out.say(f"node {new} is there")
+    out.say(f"node {new} has booted")
 
 
 def _change_over(master: LssMaster, device: _Device, new: _NewSettings, out: Output) -> None:

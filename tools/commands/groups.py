@@ -54,7 +54,8 @@ SIM = {
         "fault": "Break a running simulated robot: a cable, an encoder, a drive; or mend it.",
     },
     "sim_campaign": {
-        "campaign": "Play random users' actions and faults on simulated robots, and judge them.",
+        "campaign": "Play random user actions and faults on simulated robots, and judge how the "
+        "robots react.",
     },
     "sim_camera": {
         "camera": "Run a camera on a simulated platform until Ctrl-C; other commands use it as "

@@ -29,9 +29,12 @@ def _group() -> None:
 
 
 FilesArgument = Annotated[list[Path], argument("CSV, candump or MCAP files.", metavar="FILE...")]
-MapOption = Annotated[Path, option("Which column is what, TOML.", "--map", metavar="FILE")]
+MapOption = Annotated[
+    Path, option("TOML file that states what each column contains.", "--map", metavar="FILE")
+]
 PosesOption = Annotated[
-    Path | None, option("File with the poses, if it is another one.", "--poses", metavar="FILE")
+    Path | None,
+    option("File with the poses, if they are not in the first one.", "--poses", metavar="FILE"),
 ]
 
 
@@ -40,7 +43,9 @@ def motor(
     winch: options.WinchArgument,
     files: FilesArgument,
     mapping: MapOption,
-    out_dir: Annotated[Path, option("Folder for the passes.", "--out", metavar="DIR")],
+    out_dir: Annotated[
+        Path, option("Folder for the converted passes of the motor.", "--out", metavar="DIR")
+    ],
     overwrite: options.OverwriteOption = False,
     as_json: options.JsonOption = False,
 ) -> None:

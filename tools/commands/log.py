@@ -116,7 +116,7 @@ def plot(
     target: Annotated[
         Path | None,
         option(
-            "Draw it into NAME.png; beside the recording by default.",
+            "Draw the recording into NAME.png; default: beside the recording.",
             "--png",
             "--out",
             metavar="FILE",

@@ -55,7 +55,7 @@ _INCH_mm = 25.4
 
 
 def write_marker_sheets(path: Path, sheets: MarkerSheets, ids: Sequence[int], page: str) -> None:
-    """Write a PDF with a page for each id; raises BadInputError if one does not fit, OSError."""
+    """Write a PDF with a page for each id; raises OSError, or BadInputError if one does not fit."""
     dictionary: Any = _dictionary(sheets.dictionary)
     count = len(dictionary.bytesList)
     squares = dictionary.markerSize + 2
@@ -404,7 +404,8 @@ def _sheets(path: Path | None, size_mm: float | None, dictionary: str) -> Marker
     if path is not None:
         if size_mm is not None:
             raise BadInputError(
-                "--size-mm and --markers: give only one of them, because the file has the sizes"
+                "--size-mm and --markers: give only one of them, because the file also contains "
+                "sizes"
             )
         return MarkerSheets.load_file(path)
     if size_mm is None:
@@ -435,7 +436,9 @@ def _require_page(page: str) -> None:
 def _say(out: Output, fit: MapFit) -> None:
     cover: Coverage = fit.coverage
     share = (
-        "" if cover.share_seen is None else f", {100.0 * cover.share_seen:.0f} % of those placed"
+        ""
+        if cover.share_seen is None
+        else f", {100.0 * cover.share_seen:.0f} % of the markers laid out"
     )
     out.say(f"{cover.images} images show {len(cover.ids)} markers{share}")
     for label, lines in (("wrong", fit.faults), ("left out", fit.warnings), ("note", fit.notes)):

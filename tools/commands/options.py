@@ -88,7 +88,7 @@ def written_as(
 
 PngOption = Annotated[
     Path | None,
-    option("Draw it into NAME.png.", "--png", metavar="FILE", callback=written_as(".png")),
+    option("Draw the result into NAME.png.", "--png", metavar="FILE", callback=written_as(".png")),
 ]
 
 RobotArgument = Annotated[
@@ -206,8 +206,8 @@ ClusterOption = Annotated[
 HandEyeOption = Annotated[
     Path | None,
     option(
-        "Measured place of the camera on the platform; by default found from the "
-        "robot's rotations.",
+        "Measured place of the camera on the platform; default: found from the platform's "
+        "rotations.",
         "--hand-eye",
         metavar="FILE",
     ),

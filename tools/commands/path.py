@@ -121,7 +121,7 @@ def _with_path(
 FeedOption = Annotated[
     float | None,
     option(
-        "Percent of the planned speed; by default 100, or as before when it is resumed.",
+        "Percent of the planned speed; default: 100, or the previous value if a path is resumed.",
         min=1.0,
         max=100.0,
     ),
@@ -145,7 +145,7 @@ def show(
     picture: Annotated[
         Path | None,
         option(
-            "Draw it into NAME.png.",
+            "Draw the path into NAME.png.",
             "--png",
             "--picture",
             metavar="FILE",

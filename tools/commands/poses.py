@@ -31,7 +31,12 @@ def poses(
     robot: RobotArgument,
     count: Annotated[int, option("Number of poses.", "-n", "--count", min=1, max=100_000)] = 100,
     start: Annotated[
-        str | None, option("Start of all ways, in mm; default: home.", "--from", metavar="X Y [Z]")
+        str | None,
+        option(
+            "Start of the straight ways to the poses, in mm; default: home.",
+            "--from",
+            metavar="X Y [Z]",
+        ),
     ] = None,
     seed: SeedOption = 1,
     by: Annotated[
@@ -45,14 +50,14 @@ def poses(
     angle: Annotated[
         float | None,
         option(
-            "Largest rotation from home's orientation; default: as for targets.",
+            "Largest rotation from home's orientation; default: the limit of targets.",
             min=0.0,
             max=179.0,
             metavar="DEG",
         ),
     ] = None,
     share: Annotated[
-        float, option("Share of the way to use if it ends before its target.", min=0.01, max=1.0)
+        float, option("Share to use of a way that is blocked before its target.", min=0.01, max=1.0)
     ] = SHARE,
     out_file: Annotated[
         Path | None, option("NAME.csv or NAME.toml, in m, rad.", "--out", metavar="FILE")
@@ -140,9 +145,9 @@ def _nearest(chosen: Chosen) -> str:
 def _say(out: Output, model: PlatformModel, chosen: Chosen, count: int) -> None:
     drawn, k = chosen.drawn, model.positions
     out.say(
-        f"{count} poses of {drawn.drawn} drawn; ways cut short by contact {drawn.cut_by_contact}, "
-        f"by tensions {drawn.cut_by_tensions}; {drawn.outside} left out, because they "
-        "end outside the box of targets or on the stand",
+        f"{count} poses of {drawn.drawn} drawn; {drawn.cut_by_contact} ways cut short by contact, "
+        f"{drawn.cut_by_tensions} by tensions; {drawn.outside} left out, because they end outside "
+        "the box of targets or on the stand",
         f"{_nearest(chosen)}; tensions keep at least {chosen.margin_N:.1f} N beyond the "
         "control's reserve",
     )

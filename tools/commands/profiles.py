@@ -27,7 +27,7 @@ app = typer.Typer(
 @app.command("list")
 def list_(
     kind: Annotated[
-        str | None, argument("Only these: robots, winches, ...", metavar="[KIND]")
+        str | None, argument("List only this kind: robots, winches, ...", metavar="[KIND]")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -135,7 +135,9 @@ def pose(
 @app.command("mark-calibrated")
 def mark_calibrated_(
     robot: RobotArgument,
-    why: Annotated[str, option("How you know the exit points in its file.", "--why")],
+    why: Annotated[
+        str, option("How the exit points in the robot's file were determined.", "--why")
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """Confirm the geometry in the robot's file, e.g. after moving a rail."""
@@ -202,9 +204,8 @@ def import_(
     """Write a robot's file from a CASPR model.
 
     Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
-    The platform's origin is its centre of mass. The plane of a planar robot becomes
-    vertical. If the robot cannot work with its winches, the file is written anyway, and you can
-    edit it.
+    The platform's origin is its centre of mass. The plane of a planar robot becomes vertical. If
+    the robot cannot work with its winches, the file is written anyway, and you can edit it.
     """
     out = Output(as_json)
     _require_new(path)
@@ -213,7 +214,7 @@ def import_(
     complete = new_robot.answers_of(path, given, ask, out.stage)
     for note in ask.notes:
         out.say(f"not from the model: {note}")
-    with out.stage("checking whether it can work"):
+    with out.stage("checking whether the robot can work"):
         profile, found = new_robot.write_robot(complete, path)
     wrong = [finding for finding in found if finding.impossible]
     if profile is None or wrong:
@@ -252,7 +253,7 @@ def _described(
     ask, before = _Asker(path, given, yes), None
     while True:
         complete = new_robot.answers_of(path, {} if ask.rejected else given, ask, out.stage)
-        with out.stage("checking whether it can work"):
+        with out.stage("checking whether the robot can work"):
             profile, found = new_robot.write_robot(complete, path, over=ask.rejected)
         wrong = [finding for finding in found if finding.impossible]
         if profile is not None and not wrong:
@@ -295,7 +296,7 @@ class _Asker:
             _say("this robot cannot work:", *reasons, "another answer, please:")
 
     def __call__(self, question: Question, default: Default, problem: str) -> str:
-        """Return the answer to a question; raises BadInputError without one."""
+        """Return the answer to a question; raises BadInputError if none was given."""
         key = question.key
         if self._yes and problem:
             raise BadInputError(f"{key}: {problem}; answer it with --set")

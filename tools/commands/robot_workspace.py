@@ -101,15 +101,16 @@ def workspace(
     rotate: Annotated[
         str | None,
         option(
-            "Platform turned by this rotation vector from its orientation at home, in deg; "
-            "in a plane one angle.",
+            "Turn the platform by this rotation vector from its orientation at home, in deg; in a "
+            "plane one angle.",
             metavar="RX RY RZ | ANGLE",
         ),
     ] = None,
     within: Annotated[
         float | None,
         option(
-            "Places that allow all orientations up to this many deg from home's.", metavar="DEG"
+            "Find places that allow all orientations up to this many deg from home's.",
+            metavar="DEG",
         ),
     ] = None,
     contact_free: Annotated[

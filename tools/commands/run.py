@@ -95,13 +95,15 @@ def run(
     keep_days: Annotated[
         float | None,
         option(
-            "Remove older recordings of this robot; default: 30 in the user's folder.", min=0.01
+            "Remove recordings of this robot that are older; default in the user's folder: 30.",
+            min=0.01,
         ),
     ] = None,
     keep_gb: Annotated[
         float | None,
         option(
-            "Remove its oldest recordings above this total size; default: 20 in the user's folder.",
+            "Remove the robot's oldest recordings above this total size; default in the user's "
+            "folder: 20.",
             "--keep-gb",
             min=0.01,
         ),
@@ -112,7 +114,7 @@ def run(
     live_origin: Annotated[
         list[str] | None,
         option(
-            "A web page that may use the live view, such as https://app.foxglove.dev.",
+            "Origin of a web page that may use the live view, such as https://app.foxglove.dev.",
             metavar="ORIGIN",
         ),
     ] = None,
@@ -359,7 +361,7 @@ def _recording_text(robot: Robot, settings: RunSettings) -> str:
     keep = settings.keep
     kept = [f"{keep.days:g} days"] * math.isfinite(keep.days)
     kept += [size_text(keep.total_bytes)] * math.isfinite(keep.total_bytes)
-    until = f"keeps {' and '.join(kept)} at most" if kept else "removes none"
+    until = f"keeps at most {' and '.join(kept)}" if kept else "removes none"
     return f"records into {settings.record}: about {size_text(hour)} an hour; {until}"
 
 

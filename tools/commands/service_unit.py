@@ -57,7 +57,7 @@ def print_unit(
     if asked["allow_code"]:
         raise BadInputError(
             "--allow-code: a service must not allow code that changes later; start `cdpr run` once "
-            "with it, as the service's user"
+            "with this option, as the service's user"
         )
     if asked["unix"] is None:
         asked["unix"] = _SOCKETS / f"{profile.profile}.sock"

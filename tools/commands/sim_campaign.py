@@ -36,7 +36,8 @@ def campaign(
         int | None, option("Repeat one seed with a recording.", min=0, metavar="SEED")
     ] = None,
     shrink: Annotated[
-        int | None, option("Print the smallest script that fails like this.", min=0, metavar="SEED")
+        int | None,
+        option("Print the smallest script that fails in the same way.", min=0, metavar="SEED"),
     ] = None,
     script: Annotated[
         Path | None, option("Play this script instead of seeds.", metavar="FILE")

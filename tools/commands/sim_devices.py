@@ -74,7 +74,7 @@ def panel(
         str, argument(f"press, release, mend, {', '.join(_FAULTS)}.", metavar="ACTION")
     ],
     port: Annotated[int, option("Port of the simulated safety I/O.", min=1, max=65535)],
-    unit: Annotated[int, option("The panel's unit, as `sim safety-io` prints it.")] = 247,
+    unit: Annotated[int, option("Modbus unit of the panel, as `sim safety-io` prints it.")] = 247,
 ) -> None:
     """Press or release the emergency stop of a simulated safety I/O, or break it."""
     if action in ("press", "release"):

@@ -57,10 +57,7 @@ def fault(
     ] = None,
     axis: Annotated[
         str | None,
-        option(
-            "Axis by its name, or by its number from 1; 1 if left out, to mend and to list "
-            "all of them."
-        ),
+        option("Axis by its name, or by its number from 1. Default: 1; mend and list: all axes."),
     ] = None,
 ) -> None:
     """Break a running simulated robot: a cable, an encoder, a drive; or mend it.

@@ -41,7 +41,9 @@ def up(
     machine: RobotOrWinchArgument,
     bus: Annotated[
         list[str],
-        option("simbus:NAME, opened here, or socketcan:IFACE; for a robot also BUS=URL, each bus."),
+        option(
+            "simbus:NAME, opened here, or socketcan:IFACE; for a robot also BUS=URL for each bus."
+        ),
     ],
     plant: Annotated[Path | None, option("Plant file: the truth about motor and drive.")] = None,
     lockstep: Annotated[
@@ -224,7 +226,7 @@ def _store_file(folder: Path | None, serial: int) -> Path | None:
 def _bus(texts: list[str]) -> BusUrl:
     text = texts[0]
     if len(texts) > 1:
-        raise BadInputError(f"--bus {texts[1]}: a winch has one bus, which is {text} already")
+        raise BadInputError(f"--bus {texts[1]}: a winch has one bus, and {text} is given")
     with raised_as(BadInputError, BusError):
         url = BusUrl.parse(text)
     _require_simulated(text, url)

@@ -40,7 +40,10 @@ def verify(
     ] = None,
     busy: Annotated[
         int | None,
-        option("Number of busy processes beside it; default: one more than cores.", min=0),
+        option(
+            "Number of busy processes that disturb it; default: one more than the number of cores.",
+            min=0,
+        ),
     ] = None,
     keep: Annotated[Path | None, option("New folder for all output.", metavar="DIR")] = None,
     as_json: JsonOption = False,
@@ -90,8 +93,8 @@ def verify(
 
 
 def _show(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool:
-    """Print the verdicts; return whether all files are equal. Raises WorkFailedError without
-    files."""
+    """Print the verdicts; return whether all files are equal. Raises WorkFailedError if
+    no file was written."""
     if not any(verdict.same is not None for verdict in verdicts):
         raise WorkFailedError("the command wrote no file that can be compared")
     for verdict in verdicts:

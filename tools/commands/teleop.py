@@ -65,7 +65,10 @@ def robot(
     ],
     device: Annotated[Device, option("Input device.", "--device")] = Device.KEYBOARD,
     scale: Annotated[
-        str, option("Robot motion over hand motion; or a number.", metavar="ROBOT:HAND")
+        str,
+        option(
+            "Robot motion divided by hand motion, as a ratio or a number.", metavar="ROBOT:HAND"
+        ),
     ] = "1:1",
     script: Annotated[
         Path | None,

@@ -167,7 +167,10 @@ def calibrate(
     lowest_N: Annotated[float, option("Lowest tension, N.", "--lowest-n")] = 10.0,
     highest_N: Annotated[float, option("Highest tension, N.", "--highest-n")] = 80.0,
     travel_mm: Annotated[
-        float, option("With a fastened cable: most cable to wind in.", "--travel-mm", min=1.0)
+        float,
+        option(
+            "With a fastened cable: greatest length of cable to wind in.", "--travel-mm", min=1.0
+        ),
     ] = 500.0,
     board: Annotated[
         Path | None, option("Physics board of a simulator, which then hangs the masses itself.")
@@ -252,7 +255,7 @@ class _Run:
 
 @app.command()
 def fit(
-    folder: Annotated[Path, argument("The --out folder of a tension_calibration.")],
+    folder: Annotated[Path, argument("The --out folder of a tension calibration.")],
     winch: options.RecordedWinchOption = None,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -234,7 +234,7 @@ def anchored_points(path: Path) -> tuple[list[TorquePoint], int]:
     return points, order
 
 
-# Raise and lower a hung mass, and compute the torque for that over whole motor turns.
+# Raise and lower a hung mass, and compute the mean torques over whole motor turns.
 
 _DWELL_S = 1.0
 _RAMP_S = 0.5

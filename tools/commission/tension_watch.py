@@ -123,8 +123,8 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
     Only an empty line raises the mass, because a person who types a word wants something else.
     """
     question = (
-        f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
-        "press Enter (Ctrl-C ends)"
+        f"Hang {mass_kg:g} kg on the cable while the mass stands on its support, take up the "
+        "slack, and press Enter (Ctrl-C ends)"
     )
     with stop_on_signals() as stop_requested:
         stop_requested.closing()  # a second Ctrl-C has nothing else to end

@@ -27,7 +27,8 @@ class RobotDriveTexts:
             return load_robot(self._path)
         except ProfileError as error:
             raise DriveTextsError(
-                f"{error}; the robot runs with the file of its start: correct it"
+                f"{error}; the robot still runs with the file as it was at its start; correct the "
+                "file"
             ) from None
 
     def drives(self, statuswords: Sequence[int]) -> list[dict[str, Any]]:
@@ -54,7 +55,7 @@ class RobotDriveTexts:
 
         if axis >= len(self._robot.axes):
             raise DriveTextsError(
-                f"{self._path}: has no axis {axis} any more: start the robot again"
+                f"{self._path}: has no axis {axis} any more; start the robot again"
             )
         of = self._robot.axes[axis]
         winch = of.winch

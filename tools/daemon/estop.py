@@ -112,7 +112,7 @@ class EmergencyStop:
             waits = since_s <= _LISTENS_S
             return "" if waits else "this daemon only listens: stop the master that runs its drives"
         if since_s > _UNHEARD_S and self._cycling() is None:
-            return "its drives do not answer, and it gives them no power"
+            return "its drives do not answer, and this daemon gives them no power"
         if since_s > _CONFIRM_S:
             return f"not every drive has confirmed within {_CONFIRM_S:g} s that its power is off"
         return ""

@@ -199,7 +199,7 @@ class Launcher:
         return not self._up and bool(self.reason)
 
     def _start_failed(self, name: str, child: Child) -> None:
-        self.reason = f"the {name} could not begin: {child.end}"
+        self.reason = f"the {name} could not start: {child.end}"
         if child.process.returncode == BAD_INPUT:
             self._failure = BAD_INPUT
 

@@ -101,7 +101,7 @@ class BoundedLog(logging.Filter):
             kinds = [self._kinds.pop(key) for key in over]
         for kind in kinds:
             if kind.more:
-                text = f"{kind.more} more within {_WINDOW_S:g} s: {kind.text or 'of other kinds'}"
+                text = f"{kind.more} more within {_WINDOW_S:g} s: {kind.text or 'other messages'}"
                 extra = {"from_bounded_log": True}
                 logging.getLogger(kind.logger).log(kind.level, "%s", text, extra=extra)
 

@@ -40,9 +40,9 @@ _CLOCK_STEP_S: Final = 0.02
 _LEAST_S: Final = 1.0
 """Shorter recordings do not show whether the clocks agree."""
 _ALIKE: Final = 0.8
-"""Least correlation of rates at which another difference of the clocks is suggested."""
+"""Smallest correlation of rates at which another difference of the clocks is suggested."""
 _BETTER: Final = 0.2
-"""Least increase of the correlation for that."""
+"""Smallest increase of the correlation by that difference at which it is suggested."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def import_calibration(
     if row.size < _FEWEST:
         raise BadInputError(
             f"{cables}: {row.size} rows lie within the time of the poses, {measured.time_s[0]:.2f} "
-            f"to {measured.time_s[-1]:.2f} s (the cables': {time[0]:.2f} to {time[-1]:.2f} s); "
+            f"to {measured.time_s[-1]:.2f} s (of the cables: {time[0]:.2f} to {time[-1]:.2f} s); "
             "check the unit of the times, and correct the difference of the clocks by `offset`"
         )
     at = time[row]

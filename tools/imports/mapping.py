@@ -169,7 +169,7 @@ class CableColumns(Profile):
 
 
 class PoseColumns(Profile):
-    """Columns of a pose that a motion capture measured, in its own frame."""
+    """Columns of a pose that a motion capture system measured, in its own frame."""
 
     time: Column
     position: Annotated[tuple[Column, ...], Field(min_length=3, max_length=3)]

@@ -170,13 +170,13 @@ class Selection:
         robot = (reader.metadata.get("robot"), reader.metadata.get("axes"))
         first = self._robot = self._robot or robot
         if robot != first:
-            said = "{}: is of {} with {} axes, but earlier files are of {} with {}"
+            said = "{}: records {} with {} axes, but earlier files record {} with {}"
             raise BadInputError(
                 said.format(reader.path, *robot, *first) + "; allowed: recordings of one robot"
             )
 
     def columns(self) -> Columns:
-        """Return all rows as whole columns; raises BadInputError for none or too many."""
+        """Return all rows as whole columns; raises BadInputError for no row or too many."""
         parts, size = [], 0
         for part in self.rows():
             size += sum(column.nbytes for column in part.values())
@@ -222,7 +222,7 @@ def export(selection: Selection, path: Path) -> int:
 
 
 def write_csv(selection: Selection, file: IO[bytes]) -> int:
-    """Write the rows as CSV; return their number. Raises BadInputError without rows."""
+    """Write the rows as CSV; return their number. Raises BadInputError for no row."""
     return _write(selection, file, ".csv")
 
 

@@ -25,7 +25,7 @@ _EARLY_ns: Final = 50_000_000
 
 WHILE_ACTIVE: Final = "the recording ends while the robot was active"
 LOOP_ENDED: Final = "the control loop ended without a stop"
-_WRITER_ENDED: Final = "its writer was killed, or is a daemon of another user and still writes"
+_WRITER_ENDED: Final = "its writer was killed, or a daemon of another user still writes it"
 
 
 class Reasons:

@@ -58,7 +58,7 @@ class RecordLog:
         return max(0, os.fstat(self._fd).st_size - _HEADER_BYTES) // self.dtype.itemsize
 
     def last(self) -> Any:
-        """Return the newest record, a scalar of `dtype`; raises BadInputError without one."""
+        """Return the newest record, a scalar of `dtype`; raises BadInputError for an empty log."""
         count = len(self)
         if not count:
             raise BadInputError(f"{self.path}: holds no record yet")

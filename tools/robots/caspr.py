@@ -119,7 +119,7 @@ def _default_set(file: Path) -> list[ElementTree.Element]:
     for one in root.findall("cable_set"):
         if wanted in (None, one.get("id")):
             return list(one)
-    raise BadInputError(f"{file}: cable_set: none is called {wanted!r}, the default_cable_set")
+    raise BadInputError(f"{file}: cable_set: no set is called {wanted!r}, the default_cable_set")
 
 
 def _root(file: Path, tag: str) -> ElementTree.Element:

@@ -182,7 +182,7 @@ def _saved(answers: Answers, form: _Form, name: str, *, replace: bool) -> dict[s
     if form.problem:
         raise BadInputError(f"{form.problem}; nothing was saved")
     if (SHIPPED / "robots" / f"{name}.toml").exists():
-        raise BadInputError(f"name {name!r}: a shipped robot has it; choose another")
+        raise BadInputError(f"name {name!r}: a shipped robot has this name; choose another")
     path = _file(name)
     path.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -143,7 +143,7 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
     if (line := table["next_line"]) is not None:
         text.append(
             f"note: this plan ends at line {shown.plan.path.moves[-1].line}; `cdpr path run` "
-            f"continues there with the next one, which --line {line} shows"
+            f"continues with the next plan, which --line {line} shows"
         )
     if shown.note:
         text.append(f"note: {shown.note}")
@@ -156,7 +156,9 @@ def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
             f"{time_text(table['constant_limit_s'])}, {table['gain']:.1f} times as long",
         ]
     if table.get("slowed_moves"):
-        text.append(f"note: {table['slowed_moves']} moves ask for more speed than the robot has")
+        text.append(
+            f"note: {table['slowed_moves']} moves request a higher speed than the robot allows"
+        )
     tensions = shown.tensions
     if tensions is not None:
         least, most = tensions.tension_N.min(axis=0), tensions.tension_N.max(axis=0)
@@ -193,7 +195,7 @@ _MOST_POINTS: Final = 5000
 _SMALL: Final = 0.5
 """A path smaller than this share of the box of targets is also drawn enlarged."""
 _FLATTEST: Final = 0.4
-"""Least ratio of a view's height to its width, and of its width to its height."""
+"""Smallest ratio of a view's height to its width, and of its width to its height."""
 
 
 @dataclass(frozen=True)

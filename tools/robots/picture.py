@@ -20,7 +20,7 @@ from cdpr_tools import style
 _PLATFORM = "#d1581a"
 _WIDE_in = 7.4
 _LEAST_HIGH = 0.32
-"""Least ratio of a view's height to its width; the colour bar's label needs this room."""
+"""Smallest ratio of a view's height to its width; the colour bar's label needs this room."""
 _SEEN_THROUGH = 0.6
 """Opacity of the platform, which may cover the whole box of targets."""
 _SEEN_FROM = "from the side", "from the front", "from above"

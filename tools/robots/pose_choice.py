@@ -58,7 +58,7 @@ class Chosen:
 def choose(
     reach: Reach, count: int, seed: int, by: Choose, angle_rad: float | None, share: float
 ) -> Chosen:
-    """Return `count` reachable poses, chosen among many more unless at random."""
+    """Return `count` reachable poses, chosen from many more unless the choice is random."""
     model = reach.model
     among = count if by is Choose.RANDOM else AMONG * count
     drawn = reach.draw(among, seed, angle_rad, share)

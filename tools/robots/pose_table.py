@@ -23,7 +23,7 @@ QUATERNION: Final = ("qw", "qx", "qy", "qz")
 _TILT: Final = ("roll_rad", "pitch_rad")
 _FEWEST: Final = 32
 _LEAST_PERIODS: Final = 3
-"""Least number of periods of a swing in a table."""
+"""Smallest number of periods of a swing in a table."""
 _SLOWEST_Hz: Final = 0.1
 """Frequency of a pendulum of 25 m."""
 _ABOVE: Final = 3.0
@@ -66,7 +66,7 @@ def read_pose_table(path: Path, n: int) -> PoseTable:
             except (ValueError, IndexError):
                 cell = row[at] if at < len(row) else ""
                 raise BadInputError(
-                    f"{path}: row {number}, {name}: {cell!r} is no number"
+                    f"{path}: row {number}, {name}: {cell!r} is not a number"
                 ) from None
         if not np.isfinite(found).all():
             bad = int(np.argmin(np.isfinite(found))) + 2

@@ -22,7 +22,7 @@ from cdpr_rt.platform.motor_learning import FRICTION_SHARE
 
 KINDS = {
     "planar-3": "in a plane, x and y: 3 cables, and the platform turns freely",
-    "planar-4": "in a plane, x, y and angle: 4 cables, one more than directions",
+    "planar-4": "in a plane, x, y and angle: 4 cables, one more than the directions",
     "point-4": "a point in space, x, y, z: 4 cables from above",
     "suspended-6": "a platform in space on 6 cables from above, the fewest for its 6 directions",
     "suspended-8": "a platform in space on 8 cables from above: larger workspace and angles",
@@ -42,7 +42,7 @@ o         o    o         o    o         o    o  o     o  o     o  o     o  o
 _BUS_DRIVES = 4
 """Largest number of drives on a bus of 1 Mbit/s at 1 kHz."""
 _APART_m = 0.15
-"""Least distance of two proposed exit points, for two winches side by side."""
+"""Smallest distance of two proposed exit points, for two winches side by side."""
 _ROUND_m = 0.5
 """Proposed sizes of a frame are multiples of this."""
 
@@ -162,7 +162,7 @@ _PEAK_SHARE, _RATED_TIMES = 0.5, 2.0
 """Proposed torque, if rated torque is too little for cables that pull against each other: the
 smaller of these multiples of peak and rated torque."""
 _RANGE = 10.0
-"""Least ratio of greatest to least tension for which such cables need only the rated torque."""
+"""Smallest ratio of greatest to least tension for which such cables need only the rated torque."""
 _TORQUE_RESERVE = 0.85
 """Share of the torque available for tensions; the rest is for friction and control."""
 _LEAST, _LEAST_HANGING = 0.25, 0.1
@@ -281,7 +281,7 @@ def _limits(kind: RobotKind, masses: Masses) -> list[Question]:
         least, most = held
         share = _HANGING_MASS if kind.hangs else _MOST_MASS
         if share * most < kg:
-            kg, origin = share * most, f"{100.0 * share:.0f} % of the most"
+            kg, origin = share * most, f"{100.0 * share:.0f} % of the greatest"
         origin += f"; the cables hold {least:.2g} to {most:.2g} kg"
         return Default(f"{max(kg, _LEAST_MASS * least):.2g}", origin)
 
@@ -312,7 +312,7 @@ def _turning(kind: RobotKind) -> list[Question]:
 
     return [
         Question(
-            "angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
+            "angle_deg", "Largest rotation of targets from home's orientation (deg; 0: none)",
             _degrees(0.0, 179.0), lambda _: Default(angle, f"that of {kind.name}"),
         ),
         Question(
@@ -439,7 +439,10 @@ def _exit(i: int, kind: RobotKind) -> Question:
 
     names = ", ".join("xyz"[: kind.size])
     return Question(
-        f"exit_{i + 1}_m", f"Cable {i + 1} leaves at: {names} (m)", _point(kind.size), default
+        f"exit_{i + 1}_m",
+        f"Cable {i + 1} leaves the frame at: {names} (m)",
+        _point(kind.size),
+        default,
     )
 
 
@@ -490,7 +493,7 @@ def _anchor(i: int, kind: RobotKind) -> Question:
 
 
 def axis_names(answers: Answers) -> list[str]:
-    """Return names for the axes, after the positions of their exit points."""
+    """Return names for the axes that tell where their exit points are."""
     kind = answers["kind"]
     exits = [answers[f"exit_{i + 1}_m"] for i in range(kind.cables)]
     if kind.turns_freely:

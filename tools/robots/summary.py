@@ -88,7 +88,7 @@ def _of_tensions(s: Subject, axes: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
         "lowest_resonance_Hz": float(lowest_resonance_Hz(s.model, s.axes, points).min()),
-        # without a redundant cable lengths cannot disagree
+        # without a redundant cable, lengths cannot disagree
         "lengths_disagree_m": s.limits.lengths_disagree_m if s.n > s.model.size else None,
     }
     (of_lengths,) = corner_swings(s, Loss.LENGTHS)
@@ -200,9 +200,9 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
         rows.append([axis["name"], point_text(broken["at_m"]), lengths[0], *turned, *lengths[1:]])
     return [
         TableText(rows),
-        "Predicted for the worst corner of the box, or the worst target near one: the swing within "
-        f"{SWING_S:g} s, and the largest distances, in all and sideways, until the other cables "
-        "have lowered the platform to its ground.",
+        "Predicted for the worst corner of the box, or the worst target near one: how far the "
+        f"platform swings within {SWING_S:g} s, and how far it gets in total and sideways until "
+        "the other cables have lowered it to the ground.",
     ]
 
 
@@ -222,8 +222,8 @@ def _lowered_lines(figures: dict[str, Any]) -> list[str]:
         "",
         TableText(rows),
         "Predicted for the worst corner and winches with a friction of up to "
-        f"{100.0 * FRICTIONS[-1]:.0f} % of the rated torque. If the platform may hang, friction "
-        "keeps it at this height above its stand, without power.",
+        f"{100.0 * FRICTIONS[-1]:.0f} % of the rated torque. If a height is shown, friction may "
+        "hold the platform there above its stand without power.",
     ]
 
 
@@ -241,9 +241,9 @@ def _slip_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
         rows.append([axis["name"], *seen, f"{slip['peak_N']:.0f}", most])
     return [
         TableText(rows),
-        "Predicted for a platform at rest at home or at the same places, whichever is worst: the "
-        "largest sudden and the largest slow slip that the lengths do not show, the position error "
-        "that follows, and the peak tension when the cable is taut again.",
+        "Predicted for a platform at rest, at home or at the places above, whichever is worst: the "
+        "largest sudden and the largest slow slip that lengths do not show, the resulting position "
+        "error, and the peak tension when the cable becomes taut again.",
     ]
 
 
@@ -258,16 +258,14 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
         f"control{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
-    lines.append(
-        f"resonance  rotors against the platform over the cables at {lowest:.1f} Hz or more"
-    )
+    lines.append(f"resonance  of rotors and platform through the cables at {lowest:.1f} Hz or more")
     lines.append(_disagreement_line(figures["lengths_disagree_m"]))
     if figures["loop"] is not None:
         lines += _loop_lines(figures["loop"])
     turns = figures.get("turns_at_most_rad", 0.0)
     if turns != 0.0:  # the angle is 0 for a point
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
-        lines.append(f"           it {turning} there, which no cable can prevent")
+        lines.append(f"           the platform {turning} there, which no cable can prevent")
         lines += _free_rotation_lines(figures["free_rotation"])
     return lines
 
@@ -275,7 +273,7 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
 def _disagreement_line(allowed_m: float | None) -> str:
     if allowed_m is None:
         return (
-            "lengths    cannot contradict each other: a cable that slips, and stays tight, is not "
+            "lengths    cannot contradict each other: a cable that slips but stays tight is not "
             "noticed"
         )
     apart_mm = 1e3 * allowed_m
@@ -285,16 +283,16 @@ def _disagreement_line(allowed_m: float | None) -> str:
 def _loop_lines(loop: dict[str, float]) -> list[str]:
     slowest, fastest = loop["slowest_Hz"], loop["fastest_Hz"]
     lines = [
-        f"loop       moves the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables "
-        f"up to {_STIFFNESS_OFF:.0%} softer or stiffer it has a gain margin of "
-        f"{loop['gain_margin']:.1f} and a phase margin of "
-        f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
+        f"loop       has platform modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
+        f"{_STIFFNESS_OFF:.0%} softer or stiffer it has a gain margin of {loop['gain_margin']:.1f} "
+        f"and a phase margin of {math.degrees(loop['phase_margin_rad']):.0f} deg",
         f"           least damped oscillation: {loop['least_damped_Hz']:.1f} Hz, damping "
         f"ratio {loop['least_damping_ratio']:.2g}",
     ]
     if not loop["tensions_follow_pose"]:
         lines.append(
-            "           tensions are planned where it is wanted, and hold it there as springs"
+            "           tensions are planned for the set-point and hold the platform there like "
+            "springs"
         )
     return lines
 
@@ -310,7 +308,8 @@ def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
     ]
     if swings["lasts_s"] > 0.0:
         lines.append(
-            f"           it may take {swings['lasts_s']:.0f} s to die down to {1e3 * SWINGS_m:g} mm"
+            f"           the swing may take {swings['lasts_s']:.0f} s to die down to "
+            f"{1e3 * SWINGS_m:g} mm"
         )
     return lines
 

@@ -68,16 +68,16 @@ def lines(robot: Robot, settings: Search, found: dict[str, Any]) -> list[str]:
     ]
     if unseen:
         text.append(
-            f"warning    the rays see only a part: to {100.0 * unseen:.1f} % of the grid's places "
-            "inside no straight line from their centre leads; go by the grid"
+            f"warning    the rays reach only a part: {100.0 * unseen:.1f} % of the grid's places "
+            "inside are not on a straight line from their start; use the grid's value"
         )
     elif abs(off) > _AGREE:
-        text.append("warning    grid and rays differ: take more --cells and --rays")
+        text.append("warning    grid and rays differ: increase --cells and --rays")
     if found["reaches_sides"]:
         sides = ", ".join(found["reaches_sides"])
         text.append(
-            f"warning    it reaches the sides of the searched box ({sides}) and may extend "
-            "beyond them: use --low, --high"
+            f"warning    the workspace reaches the sides of the searched box ({sides}) and may "
+            "extend beyond them: use --low, --high"
         )
     return text
 
@@ -93,7 +93,7 @@ def _criterion_lines(settings: Search) -> list[str]:
             what += f" and {turning:.0f} deg/s2"
         what += " along all directions together"
     if criterion.least_N:
-        what += f", {criterion.least_N:g} N kept from the bounds of tensions"
+        what += f", {criterion.least_N:g} N from the bounds of tensions"
     orientation = "at home's orientation"
     if len(turns) > 1:
         angle = math.degrees(float(np.linalg.norm(turns, axis=1).max()))
@@ -107,8 +107,8 @@ def _criterion_lines(settings: Search) -> list[str]:
     if criterion.contact_free:
         clearance = 1e3 * platform.clearance_m
         lines.append(
-            "           reached straight from where the rays start, all things "
-            f"{clearance:g} mm apart or more"
+            f"           reached on a straight line from the start of the rays, with {clearance:g} "
+            "mm or more between all parts"
         )
     return lines
 
@@ -121,10 +121,10 @@ _FINE, _KNOTS = 90, 700
 _OUTSIDE_N = -1e6
 _SECTIONS = ((0, 2), (1, 2), (0, 1))
 _LEGEND = [
-    Line2D([], [], color=_RAYS, lw=1.4, label="border by rays"),
-    Line2D([], [], color=_GRID, lw=1.4, ls="--", label="border by the grid"),
+    Line2D([], [], color=_RAYS, lw=1.4, label="border found by rays"),
+    Line2D([], [], color=_GRID, lw=1.4, ls="--", label="border found by the grid"),
     Line2D([], [], color=LINES, ls="", marker="s", ms=5, label="exit points"),
-    Line2D([], [], color=LINES, ls="", marker="+", ms=8, label="where the rays start"),
+    Line2D([], [], color=LINES, ls="", marker="+", ms=8, label="start of the rays"),
 ]
 
 

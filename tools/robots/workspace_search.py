@@ -109,9 +109,12 @@ def _centre(settings: Search, grid: Grid) -> FloatArray:
     """Return the place where rays start."""
     deepest, depth_N = grid.deepest
     if not depth_N >= 0.0:
-        near = f"nearest to it is {in_mm(deepest)} mm, {-depth_N:.1f} N short"
+        near = (
+            f"the nearest place is {in_mm(deepest)} mm, where the margin of tensions is "
+            f"{-depth_N:.1f} N too small"
+        )
         if not np.isfinite(depth_N):
-            near = "nowhere can the tensions act in all directions"
+            near = "at no place can the tensions act in all directions"
         raise WorkFailedError(
             f"no place of the grid from {in_mm(settings.box.low_m)} to "
             f"{in_mm(settings.box.high_m)} mm is in this workspace; {near}"

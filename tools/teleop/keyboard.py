@@ -1,4 +1,4 @@
-"""Lead a robot by the keys of a terminal: each press, and each repeat, is one step."""
+"""Lead a robot with the keys of a terminal: each press, and each repeat, is one step."""
 
 from __future__ import annotations
 

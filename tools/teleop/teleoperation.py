@@ -206,7 +206,7 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
     """Report what was confirmed, and what happened to the sent set-points."""
     figures = session.figures()
     trip = figures["round_trip_ms"]
-    delay = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
+    delay = f"; round trip {trip['p50']:.1f} ms, at most {trip['p99']:.1f} ms for 99 of 100"
     with suppress(OSError):  # the reader is gone
         for one in session.confirmations:
             place = " ".join(f"{1e3 * value:+.2f}" for value in one.pose_m)

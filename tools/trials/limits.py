@@ -30,7 +30,7 @@ _LONG_EVERY: Final = 5
 """A long rest follows every n-th finished move."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
 _MOVED: Final = 2e-3
-"""Least motion of a leg in a direction, m or rad, for which an overshoot is computed."""
+"""Smallest motion of a leg in a direction, m or rad, for which an overshoot is computed."""
 _THERE: Final = 1e-5
 """A set-point this near to its target counts as standing there, m or rad."""
 _TORQUE_STEP_SHARE: Final = 1e-3

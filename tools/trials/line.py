@@ -17,7 +17,7 @@ SPEED_m_s: Final = 0.01
 LENGTH_m: Final = 0.6
 """Length of each line, but at most half the workspace; motors make several turns along it."""
 RATIO: Final = 3.0
-"""Least ratio of the distances without and with compensation, at `SPEED_m_s`."""
+"""Smallest ratio of the distances without and with compensation, at `SPEED_m_s`."""
 SETPOINT_mm: Final = 2.0
 """Largest distance from the set-point at other speeds."""
 WITH, WITHOUT = "with", "without"
@@ -124,7 +124,7 @@ def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
     figures, ratios = [], []
     slow = speed_m_s == SPEED_m_s
     for less_mean in (False, True):
-        key, less = ("_less_mean", ", less its mean") if less_mean else ("", "")
+        key, less = ("_less_mean", ", minus its mean") if less_mean else ("", "")
         rms = {part: rms_mm(recorded, less_mean) for part, recorded in parts.items()}
         for i, (what, text) in enumerate((("path", "line"), ("setpoint", "set-point"))):
             judged = what == "setpoint" and not less_mean
@@ -134,7 +134,7 @@ def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
                 figures.append(Figure(f"{what}_{part}{key}_mm", title, values[i], "mm", limit))
             if len(rms) == len(NAMES):
                 ratio = rms[WITHOUT][i] / rms[WITH][i]
-                title = f"distance from the {text}{less}, without over with"
+                title = f"distance from the {text}{less}, ratio without to with"
                 limit = RATIO if judged and slow else None
                 ratios.append(Figure(f"{what}{key}_ratio", title, ratio, "", limit, True))
     return [*figures, *_orientation(parts), *ratios]

@@ -60,7 +60,7 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
 
 
 def plan_of(planner: PathPlanner, directions: Directions, speed_m_s: float) -> PathPlan:
-    """Return the plan of the trial's path; raises WorkFailedError without one."""
+    """Return the plan of the trial's path; raises WorkFailedError if it has no plan."""
     origin = 0.5 * (directions.low_m + directions.high_m)
     settings = GcodeSettings(origin, 0.0)
     path = read_gcode(gcode(directions, speed_m_s), FILE, planner.coordinates, settings)
@@ -169,7 +169,7 @@ def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
     return [
         Figure("planned_s", "planned duration", errors.planned_s, "s"),
         Figure("taken_s", "duration of the set-point's motion", errors.taken_s, "s"),
-        Figure("late_share", "difference of both, share", late, "", LATE),
+        Figure("late_share", "relative difference of the two durations", late, "", LATE),
         Figure("top_speed_m_s", "fastest, true", float(speed.max()), "m/s"),
         Figure("path_mm", "RMS distance from the planned path", rms(errors.off_mm), "mm", RMS_mm),
         Figure("path_worst_mm", "worst distance from it", float(errors.off_mm.max()), "mm"),

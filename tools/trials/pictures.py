@@ -44,7 +44,7 @@ def of_targets(recorded: Recorded) -> Figure:
         off.set(xlabel=f"{name} error (mm)", ylabel=f"{other} error (mm)")
         where.plot(*places[:, view].T, "o", color=_TRUE, ms=4)
         _ways(where, recorded, view)
-    axes[0].set_title("true position less target")
+    axes[0].set_title("true position minus target")
     axes[1].set_title("targets")
     if len(turned):
         _orientations(axes[-2], axes[-1], recorded, turned)
@@ -74,7 +74,7 @@ def _orientations(off: Axes, over: Axes, recorded: Recorded, errors: FloatArray)
             1 + np.arange(len(errors)), errors[:, i], "o-", color=colour, ms=3, lw=0.5, label=name
         )
     off.axhline(0.0, color="black", lw=0.5)
-    off.set(xlabel="target", ylabel="deg", title="true orientation less target")
+    off.set(xlabel="target", ylabel="deg", title="true orientation minus target")
     legend_beside_title(off)
     _angles(over, recorded)
 
@@ -116,7 +116,7 @@ def of_lines(parts: dict[str, Recorded], speed_m_s: float) -> Figure:
             ax.set(ylabel="off (deg)", xlabel="angle (deg)", title=f"turn of {name} ({styles})")
         else:
             title = f"line along {name}, {1e3 * speed_m_s:g} mm/s ({styles})"
-            ax.set(ylabel="distance (mm)", xlabel="way along the line (mm)", title=title)
+            ax.set(ylabel="distance (mm)", xlabel="position along the line (mm)", title=title)
     legend_above(figure, axes[0])
     return figure
 
@@ -174,7 +174,7 @@ def _rest(axes: list[Axes], recorded: Recorded) -> None:
     views = _VIEWS[recorded.directions.k]
     for view, ax in zip(views, axes, strict=False):
         _ways(ax, recorded, view)
-        ax.set_title("way of the platform")
+        ax.set_title("path of the platform")
     left = axes[len(views) :]
     if recorded.directions.turns:
         _angles(left.pop(0), recorded)
@@ -195,7 +195,7 @@ def of_stream(recorded: Recorded) -> Figure:
     for i in range(k):
         speed.plot(time_s[:-1][shown[:-1]], velocity[shown[:-1], i], color=SERIES[i])
     _steps(step, recorded, 1e3 * steps[:, :k], 1e3 * directions.acceleration[0])
-    place.set(ylabel="m", title="way since the beginning (excerpt)")
+    place.set(ylabel="m", title="distance since the beginning (excerpt)")
     speed.set(ylabel="m/s", title="commanded velocity (excerpt)")
     step.set(
         xlabel="s", ylabel="mm/s", title="step of the commanded velocity per cycle, and its limit"
@@ -240,7 +240,7 @@ def _ways(ax: Axes, recorded: Recorded, view: tuple[int, int]) -> None:
     """Draw the true motion in one view, with the workspace."""
     directions: Directions = recorded.directions
     name, other = (directions.names[i] for i in view)
-    ax.plot(*recorded.true_m[::20, view].T, color="#bbbbbb", lw=0.4, label="way of the platform")
+    ax.plot(*recorded.true_m[::20, view].T, color="#bbbbbb", lw=0.4, label="path of the platform")
     box_of_targets(ax, directions.low_m, directions.high_m, view)
     ax.set_aspect("equal", "datalim")
     ax.autoscale_view()

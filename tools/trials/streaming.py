@@ -187,10 +187,12 @@ def judge(recorded: Recorded) -> list[Figure]:
     sent = network["sent"]
     figures = [
         Figure("sent", "set-points sent", sent),
-        Figure("lost", "of them lost", 100.0 * network["lost"] / sent, "%"),
+        Figure("lost", "packets lost", 100.0 * network["lost"] / sent, "%"),
         Figure("doubled", "came twice", 100.0 * network["doubled"] / sent, "%"),
-        Figure("overtaken", "overtaken by later ones", 100.0 * network["overtaken"] / sent, "%"),
-        Figure("way_m", "way of the set-point", way, "m"),
+        Figure(
+            "overtaken", "packets overtaken by later ones", 100.0 * network["overtaken"] / sent, "%"
+        ),
+        Figure("way_m", "path length of the set-point", way, "m"),
         Figure("speed_m_s", "fastest set-point along a direction", float(velocity.max()), "m/s"),
         Figure(
             "step_mm_s",

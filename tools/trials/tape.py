@@ -22,7 +22,7 @@ from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 OFF_M: Final = (0.02, 0.05)
-"""Least and largest distance of each true exit point from that of the robot's file."""
+"""Smallest and largest distance of each true exit point from that of the robot's file."""
 POSES: Final = 100
 SPEED_SHARE: Final = 0.25
 """Share of the speed in the robot's file: a robot that is not calibrated yet moves slowly."""
@@ -73,7 +73,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     targets = targets.reshape(-1, directions.d)
     off = np.linalg.norm(recorded.true_m[rows] - targets[:, : directions.k], axis=1)
     cut_short = bool(recorded.marked(_TIME_OVER))
-    text = f"poses, out and back{f', of {POSES}: the time was over' if cut_short else ''}"
+    text = f"poses, out and back{f', of {POSES}: the time ran out' if cut_short else ''}"
     figures = [
         Figure("poses", text, len(marks), "", 1 if cut_short else POSES, True),
         Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),

@@ -180,7 +180,7 @@ function Results({ job, start }: { job: Job; start: Props["start"] }) {
     case "measure": return <GeometryResult job={job} start={start} />;
     case "adopt": return <Result title="Adopted" good={Boolean(result["in_force"])} text={result["in_force"] ? "The calibration takes effect at the next start of the robot." : `Not adopted: ${String(result["not_taken_over"] ?? "")}`} />;
     case "check": return <Result title="Check" good={result["ok"] === true} text={result["ok"] ? "Nothing has changed enough to matter." : "The robot has changed. The messages name the part. Calibrate it again."} />;
-    case "undo": return <Result title="Undone" good text="The geometry from before applies at the next start of the robot." />;
+    case "undo": return <Result title="Undone" good text="The previous geometry applies from the next start of the robot." />;
     case "tension": return <TensionResult job={job} />;
     case "lens": return <LensResult job={job} />;
     default: return null;
@@ -238,7 +238,7 @@ function GeometryResult({ job, start }: { job: Job; start: Props["start"] }) {
       {found.open.length > 0 && <><h3 class="next-steps">What to do next</h3><ul>{advices.map((advice) => <li key={advice}>{sentence(advice)} <small class="quiet">Not known without it: {found.open.filter((one) => one.advice === advice).map(({ what }) => what).join("; ")}.</small></li>)}</ul></>}
       {found.good && (
         <>
-          {!change.significant && <label class="consent"><input type="checkbox" checked={anyway} onChange={(event) => setAnyway(event.currentTarget.checked)} /> <span>Adopt it although its changes are not significant.</span></label>}
+          {!change.significant && <label class="consent"><input type="checkbox" checked={anyway} onChange={(event) => setAnyway(event.currentTarget.checked)} /> <span>Adopt the calibration although its changes are not significant.</span></label>}
           <div class="row"><button class="go" disabled={!change.significant && !anyway} onClick={() => void start({ procedure: "adopt", measurement, insignificant: anyway })}>Adopt</button></div>
         </>
       )}
@@ -273,7 +273,7 @@ function LensResult({ job }: { job: Job }) {
   if (found.rms_px === undefined) return null;
   const missing = found.missing ?? [];
   return (
-    <Result title="Lens" good={missing.length === 0} text={missing.length ? "The lens is calibrated, but views are missing." : "The images are enough."}>
+    <Result title="Lens" good={missing.length === 0} text={missing.length ? "The lens is calibrated, but views are missing." : "No more images are needed."}>
       <Figures of={[
         ["Corners fit to, rms", figure(found.rms_px, 3, "px")], ["Images used", String(found.used)],
         ["Focal lengths", (found.focal_px ?? []).map((one) => one.toFixed(1)).join(", ") + " px"], ["Centre", (found.centre_px ?? []).map((one) => one.toFixed(1)).join(", ") + " px"],

@@ -195,7 +195,7 @@ function Diagnosis({ found, questions }: { found: Described | null; questions: Q
     <section class="card" aria-labelledby="diagnosis">
       <h2 id="diagnosis">Diagnosis</h2>
       <p aria-live="polite" class={!found ? "quiet" : impossible ? "fault" : findings.length ? "busy" : "on"}>
-        <strong>{!found ? "Computing …" : impossible ? "This robot cannot work." : findings.length ? "It can work, with doubts." : "It can work. No problems found."}</strong>
+        <strong>{!found ? "Computing …" : impossible ? "This robot cannot work." : findings.length ? "It can work, but see the warnings." : "It can work. No problems found."}</strong>
       </p>
       {findings.length > 0 && (
         <ul class="findings">

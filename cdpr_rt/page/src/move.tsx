@@ -68,7 +68,7 @@ export function Move() {
   );
 }
 
-/** The target as the daemon expects it; null while a field is no number. */
+/** The target as the daemon expects it; null while a field is not a number. */
 export function targetOf(platform: Platform, typed: string[]): { position_m: number[]; rotation_rad: number[] } | null {
   const numbers = typed.map(Number), count = positionsOf(platform).length;
   if (typed.some((text, number) => text.trim() === "" || !Number.isFinite(numbers[number]))) return null;

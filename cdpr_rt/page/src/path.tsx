@@ -123,7 +123,7 @@ function Verdict({ path, stale, busy, next }: { path: Planned; stale: boolean; b
   if (!path.plan) return null;
   return (
     <>
-      <p class="verdict good" role="status">The robot can follow it: {lengthText(path.length_m ?? 0)} in {clock(path.duration_s ?? 0)}.</p>
+      <p class="verdict good" role="status">The robot can follow the path: {lengthText(path.length_m ?? 0)} in {clock(path.duration_s ?? 0)}.</p>
       {path.notices?.map((one) => <p key={one} class="quiet">{one}</p>)}
       {path.next_line != null && <p class="quiet">This plan ends before line {path.next_line}.</p>}
       <div class="row">

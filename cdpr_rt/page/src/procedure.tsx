@@ -78,7 +78,7 @@ function Ending({ job }: { job: Job }) {
   const pages = job.reports.filter(({ path }) => path.endsWith(".html"));
   return (
     <>
-      <p class={job.error ? "fault" : "on"}>{job.error ? sentence(job.error) : "It is finished."}</p>
+      <p class={job.error ? "fault" : "on"}>{job.error ? sentence(job.error) : "The procedure is finished."}</p>
       {pages.length > 0 && (
         <p class="links">{pages.map(({ title, path }) => <a key={path} href={path} target="_blank" rel="noopener">Open the report: {title}</a>)}</p>
       )}

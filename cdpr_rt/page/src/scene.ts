@@ -376,7 +376,7 @@ export function drawnIn(host: HTMLElement): RobotScene | null {
     return new RobotScene(host);
   } catch {
     host.classList.add("undrawn");
-    host.textContent = "This browser cannot draw in three dimensions (WebGL). All else works.";
+    host.textContent = "This browser cannot draw in three dimensions (WebGL). Everything else works.";
     return null;
   }
 }

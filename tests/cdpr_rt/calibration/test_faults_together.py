@@ -179,7 +179,7 @@ def test_slipped_encoders_and_faulty_markers_are_reported_and_tolerated() -> Non
     assert jumps == pytest.approx({(6, 10): -0.008, (1, 15): 0.006}, abs=1e-3)
     for said in (
         "slipped", "from pose 11 on", "pose 5: black", "marker 11 is twice in 1 images",
-        "marker 12 is printed as its mirror", "marker 5 was moved by",
+        "marker 12 is printed as a mirror", "marker 5 was moved by",
     ):  # fmt: skip
         assert said in words
     assert readings.off_mm(outcome) < 3.0

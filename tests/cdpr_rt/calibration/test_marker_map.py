@@ -216,17 +216,17 @@ def test_a_marker_moved_twice_is_not_reported_as_partly_covered(one: Room) -> No
 def test_each_faulty_marker_gives_one_warning() -> None:
     found = [
         Suspect(9, "covered", "marker 9 is partly covered", (3, 4)),
-        Suspect(2, "twice", "marker 2 is there twice"),
+        Suspect(2, "twice", "marker 2 appears twice"),
         Suspect(9, "moved", "marker 9 was moved"),
     ]
     said = ["marker 9 is partly covered; without these: marker 9 was moved"]
-    assert warnings([], found) == [*said, "marker 2 is there twice"]
+    assert warnings([], found) == [*said, "marker 2 appears twice"]
 
 
 def test_a_duplicate_id_is_reported(one: Room) -> None:
     twice = one.with_marker_off(ODD, (0.6, 0.0, 0.0), lambda i: i % 2 == 0)
     fit = fit_map(twice.sightings(), intrinsics(), SHEETS)
-    assert any(f"marker {ODD} is there twice" in line for line in fit.warnings)
+    assert any(f"marker {ODD} appears twice" in line for line in fit.warnings)
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
     both = [dataclasses.replace(one.sightings()[0], repeated=(33,)), *one.sightings()[1:]]
     assert "printed twice" in fit_map(both, intrinsics(), SHEETS).warnings[0]
@@ -369,7 +369,7 @@ def test_one_of_the_two_poses_of_a_square_is_the_true_one() -> None:
 
 def test_duplicate_or_sizeless_markers_are_rejected() -> None:
     corners = np.zeros((4, 2))
-    with pytest.raises(Exception, match="marker 3 is there twice in image number 0"):
+    with pytest.raises(Exception, match="marker 3 appears twice in image number 0"):
         SeenMarkers.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})
     with pytest.raises(Exception, match="marker 4 was seen, but its size is not stated"):
         SeenMarkers.of(["a"], [(0, 3, corners), (0, 4, corners)], {3: 0.1})

@@ -155,7 +155,7 @@ SLIPS: dict[str, tuple[Callable[[PointSet, FloatArray], FloatArray], str]] = {
         "the scale of all measured points is +",
     ),
     "one in cm": (_one_in_cm, "it fits if it is in cm"),
-    "one 120 mm off": (_one_off, "mm from the position by all other readings"),
+    "one 120 mm off": (_one_off, "mm from the position that all other readings give"),
 }
 """Changes of points and the required report."""
 _LEFT_OUT = ("one in cm", "one 120 mm off")

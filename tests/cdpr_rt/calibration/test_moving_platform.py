@@ -65,7 +65,7 @@ def test_noise_and_time_offset_are_estimated_without_inventing_faults(
         assert all(f"allowed: {3.0 * file_mm:.1f} mm" in text for text in against)
     said = "\n".join(outcome.verdict())
     assert "time offset: measured points are +" in said
-    assert "noise of the lengths by the data: 1." in said
+    assert "noise of the lengths, estimated from the data: 1." in said
 
 
 def test_errors_of_parameters_and_held_out_blocks_are_as_predicted(tmp_path: Path) -> None:

@@ -48,7 +48,8 @@ def test_lengths_that_jump_stop_the_motion_before_they_disagree_too_far(
     assert told == [Reaction.NONE] * (len(told) - 1) + [Reaction.CONTROLLED_STOP]
     assert (supervisor.limit, supervisor.axis) == (Limit.LENGTHS_JUMP, axis)
     assert reason_of(supervisor).startswith(
-        f"{named}the cables' lengths suddenly changed against each other by 8.0 mm, 7.0 mm allowed"
+        f"{named}the cables' lengths suddenly changed relative to each other by 8.0 mm, "
+        "7.0 mm allowed"
     )
 
 

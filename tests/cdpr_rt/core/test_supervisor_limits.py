@@ -276,7 +276,7 @@ CASES = [
     Case(
         Limit.NOT_FINITE,
         torque(math.nan),
-        "axis 2: the controller's torque is nan, a finite number is required",
+        "axis 2: the controller's torque is nan; a finite number is required",
     ),
 ]
 

@@ -215,7 +215,7 @@ def test_a_problem_at_all_places_is_reported_in_general(tmp_path: Path) -> None:
 def test_angular_speed_contributes_to_cable_speed(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
     told = findings_of(tmp_path, text)["platform.speed_m_s"]
-    assert "along and about all directions together cables run at up to" in told
+    assert "along and about all directions, cables run at up to" in told
     found = re.search(
         r"up to (\S+) with angular_speed_rad_s up to (\S+), or limits.speed_rad_s from (\d+)$", told
     )
@@ -381,7 +381,7 @@ def test_friction_that_turns_a_planar_platform_is_reported_without_axis(tmp_path
     told = findings_of(tmp_path, text)["axes[0].anchor_point_m"]
     found = re.search(
         r"friction of 12 N, .* turns the platform by ([\d.]+) deg until the control overcomes it "
-        r"\(1 mm of each cable is ([\d.]+) deg\).*hold it turned by at most ([\d.]+) deg",
+        r"\(1 mm of each cable is ([\d.]+) deg\).*hold a rotation of at most ([\d.]+) deg",
         told,
     )
     assert found is not None, told

@@ -48,7 +48,10 @@ def test_an_angle_that_is_held_nowhere_in_the_box_is_impossible(tmp_path: Path) 
     path = tmp_path / "turning.toml"
     for shipped, about in ((SPATIAL, " about z"), (WALL, "")):
         path.write_text(re.sub(r"(workspace_angle_rad =) \S+", r"\1 2.0", shipped))
-        refused = rf"workspace_angle_rad: value 2; turned by [\d.]+ deg{about}, .*up to ([\d.]+)"
+        refused = (
+            r"workspace_angle_rad: value 2; if the platform is turned by [\d.]+ "
+            rf"deg{about}, .*up to ([\d.]+)"
+        )
         with pytest.raises(ProfileError, match=refused) as caught:
             refuse_impossible(load_robot(path))
         assert "anchor_point_m" not in str(caught.value)  # anchor points are not the cause
@@ -79,7 +82,9 @@ def test_an_upright_rod_without_foot_is_reported_as_tipping(tmp_path: Path) -> N
     for body, told in (("", True), (BODY, False)):
         path.write_text(text.replace(BODY, f"{rod}\n{body}"))
         found = {f.key: f.text for f in diagnose(load_robot(path))}
-        assert ("0 % of its weight tip it over" in found.get("axes[0].anchor_point_m", "")) == told
+        assert (
+            "0 % of its weight tips the platform over" in found.get("axes[0].anchor_point_m", "")
+        ) == told
 
 
 def test_the_simulated_platform_stands_on_the_body_of_its_file(tmp_path: Path) -> None:

@@ -21,8 +21,8 @@ CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
 SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
 STANDARD_GRAVITY = 9.80665
 TURNED = (
-    r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, as the control computes "
-    r"from equilibrium, (\S+) mm from"
+    r"at \((.*), (.*), (.*)\) m the platform hangs turned by (\S+) deg, "
+    r"(\S+) mm from where it would be without that rotation"
 )
 
 
@@ -133,7 +133,7 @@ def test_a_platform_whose_lengths_would_disagree_is_impossible(tmp_path: Path) -
     found = rotation_finding(tmp_path, text.replace("mass_kg", controlled, 1))
     assert found is not None and found.impossible
     assert re.search(r"^rx, ry left out: .* disagree by \d+\.\d mm, 31\.6 mm allowed", found.text)
-    assert "its cables can control them" in found.text
+    assert "its cables can control these directions" in found.text
 
 
 def test_disagreement_is_measured_by_normalised_residuals(tmp_path: Path) -> None:
@@ -177,7 +177,9 @@ def test_the_reported_periods_are_those_of_a_pendulum_on_cables_of_fixed_length(
 ) -> None:
     found = rotation_finding(tmp_path, hanging(0.05, 0.1))
     assert found is not None
-    figures = re.search(r"it swings at \((.*), (.*), (.*)\) m in (\S+) and (\S+) s", found.text)
+    figures = re.search(
+        r"the platform swings at \((.*), (.*), (.*)\) m in (\S+) and (\S+) s", found.text
+    )
     assert figures is not None, found.text
     statics = statics_of(load_robot(tmp_path / "hanging.toml"))
     platform = statics.platform

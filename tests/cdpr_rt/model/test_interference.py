@@ -200,7 +200,7 @@ def test_a_way_not_proven_clear_is_rejected_with_a_reason() -> None:
     assert model.interference.first_contact(way) is None
     found = model.interference.first_contact(way, 1)
     assert found is not None and not found.known and found.share < 1.0
-    assert "or the check needs too long; choose another way, or go in parts" in str(found)
+    assert "or the check takes too long; choose another way, or move in several steps" in str(found)
 
 
 def test_a_flat_platform_that_turns_is_proved_clear_in_few_steps() -> None:

@@ -41,7 +41,7 @@ def test_a_cell_with_a_wrong_reading_is_named_with_the_error(off_N: float, word:
     cells = Cells()
     assert not cells.told()
     cells.read_N[2] += off_N
-    assert cells.told().startswith(f"three: its load cell shows 40 N {word} than by its motor")
+    assert cells.told().startswith(f"three: its load cell shows 40 N {word} than its motor")
     cells.read_N[2] -= off_N
     cells.check.restart()
     assert cells.told().startswith("three"), "the report stays until it is cleared"

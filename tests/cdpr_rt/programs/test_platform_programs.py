@@ -123,7 +123,7 @@ def test_a_broken_cable_is_reported_and_all_cables_are_released(robot: Standing)
     robot.slack_m[1] = 5.0
     robot.switch("tighten")
     told = robot.until_done(60.0)
-    assert told["trouble"].startswith("upper right: 1000.0 mm reeled in and not tight")
+    assert told["trouble"].startswith("upper right: 1000.0 mm reeled in without becoming tight")
     assert told["trouble"].endswith("or the platform is not at home: put it there")
     assert robot.parts.last_stop.broken == {1: told["trouble"]}
     robot.run(0.5)
@@ -190,7 +190,7 @@ def test_a_cable_that_goes_slack_ends_tightening(robot: Standing):
     robot.slack_m[0] += 5.0
     told = robot.until_done(20.0)
     assert told["trouble"].startswith("upper left: 5")
-    assert "reeled in and not tight" in told["trouble"]
+    assert "reeled in without becoming tight" in told["trouble"]
 
 
 def test_a_cable_that_seemed_broken_is_named_until_all_are_tight(robot: Standing):
@@ -198,8 +198,10 @@ def test_a_cable_that_seemed_broken_is_named_until_all_are_tight(robot: Standing
     robot.parts.last_stop.broken[2] = "lower: the cable seems broken"
     robot.switch("tighten")
     told = robot.until_done(60.0)
-    assert told["trouble"].startswith("upper left: 1000.0 mm reeled in and not tight")
-    assert told["trouble"].endswith("; before that, lower: the cable seems broken: is it repaired?")
+    assert told["trouble"].startswith("upper left: 1000.0 mm reeled in without becoming tight")
+    assert told["trouble"].endswith(
+        "; before that, lower: the cable seems broken: has this been repaired?"
+    )
     (notice,) = (text for text in robot.parts.notices() if "repair it" in text)
     assert "upper left: " in notice and "lower: " in notice
     robot.run(0.5)
@@ -474,7 +476,7 @@ def test_cables_that_are_not_tight_in_time_are_named_with_their_tension(
     robot.slack_m[1] += 0.4
     robot.switch("tighten")
     told = robot.until_done(5.0)["trouble"]
-    assert told.startswith("no further cable tight within 2 s: upper right pulls with ")
+    assert told.startswith("no further cable became tight within 2 s: upper right pulls with ")
     assert 0.0 < float(told.split("with ")[1].split(" N")[0]) < 20.0
     assert "left" not in told and "lower" not in told
 
@@ -485,8 +487,8 @@ def test_a_cable_that_pulls_but_does_not_stand_still_is_named(
     until(robot, "pull")
     monkeypatch.setattr(tighten_module, "_TIGHT_WITHIN_S", 0.0)
     told = robot.until_done(1.0)["trouble"]
-    assert told.startswith("no further cable tight within 0 s: ")
-    assert told.endswith(" N and does not stand still")
+    assert told.startswith("no further cable became tight within 0 s: ")
+    assert told.endswith(" N and keeps moving")
 
 
 @pytest.mark.parametrize("stage", ["slack", "pull"])

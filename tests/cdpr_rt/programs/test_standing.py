@@ -142,7 +142,7 @@ def test_a_large_frame_allows_more_disagreement_away_from_home() -> None:
     assert not disagreement(parts, "last")
     told = disagreement(parts, "home")
     assert "50 mm allowed, one of axis 1, " in told, "the most likely cable is named first"
-    assert "; it does not stand at home" in told
+    assert "; the platform is not at home" in told
 
 
 # Tensions at a standing platform.

@@ -54,4 +54,4 @@ def test_too_many_different_texts_are_counted_together(log: Log) -> None:
     assert shown < 100
     log.now_s = 61.0
     log.bounded.report_suppressed()
-    assert log.lines()[shown:] == [f"{10_000 - shown} more within 60 s: of other kinds"]
+    assert log.lines()[shown:] == [f"{10_000 - shown} more within 60 s: other messages"]

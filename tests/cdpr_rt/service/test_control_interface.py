@@ -404,6 +404,6 @@ def test_objects_are_read_with_access_and_written_with_the_right_to_move(rig: Ri
             assert client.post("/object", json={**body, **wrong}).status_code == 422
         client.post("/object", json={**body, "value": 1}, headers=take(client))
         events = [one["text"] for one in client.get("/events").json()["events"]]
-    assert events.count("object of axis 1, 603Fh:0 to 1 by maria") == 1
+    assert events.count("object 603Fh:0 of axis 1 set to 1 by maria") == 1
     read, written = rig.loop.commands
     assert (read["value"], written["value"]) == (None, 1)

@@ -351,8 +351,8 @@ def test_an_operators_confirmation_is_recorded_once() -> None:
     watched.of_rows(rows[:5])
     told = [event for some in (rows[5:30], rows[30:]) for event, _ in watched.of_rows(some)]
     assert [(event["cycle"], event["text"]) for event in told] == [
-        (20, "the operator confirmed, number 1"),
-        (40, "the operator confirmed, number 3"),
+        (20, "the operator confirmed target number 1"),
+        (40, "the operator confirmed target number 3"),
         (50, "hold"),
     ]
     assert confirmation(stream_buttons(clutch=True, confirmed=256)) == 1

@@ -153,7 +153,7 @@ def test_a_new_device_gets_its_node_id_boots_and_keeps_it(tmp_path: Path) -> Non
         master.store()
         master.release()
         assert master.wait_for_boot_up(5)
-        assert master.node_id_in_use(5) == "it answers to SDO"
+        assert master.node_id_in_use(5) == "it answers SDO requests"
         assert master.read_object(5, 0x1000) == 0x00020192
         with pytest.raises(SdoAbortError, match="object does not exist"):
             master.read_object(5, 0x2345)
@@ -161,7 +161,7 @@ def test_a_new_device_gets_its_node_id_boots_and_keeps_it(tmp_path: Path) -> Non
             master.read_object(6, 0x1000)
         assert master.unconfigured() == [address(6)]
     with master_of(device(7, store=path)) as master:
-        assert master.node_id_in_use(5) == "it answers to SDO"
+        assert master.node_id_in_use(5) == "it answers SDO requests"
 
 
 def test_a_node_id_in_use_by_a_stopped_node_is_detected_by_heartbeat() -> None:

@@ -275,8 +275,8 @@ def test_layer_setting_services_are_decoded(
         "-> configure node id 8",
         "-> configure bit rate 500 kbit/s",
         "-> store the configuration",
-        "-> tell your node id",
-        "-> tell your vendor",
+        "-> report your node id",
+        "-> report your vendor",
         "-> fast scan: start again",
     ]
     assert decoded(0x7E4, "5A 019ACD00 000000").text == "<- vendor is 00CD9A01h"

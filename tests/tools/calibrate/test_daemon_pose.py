@@ -93,7 +93,7 @@ def test_poses_are_appended_and_restarted_lengths_detected(tmp_path: Path) -> No
     data = load_data(tmp_path / "data.json")
     assert len(data.poses) == 4 and not data.simulated
     assert data.poses[1].target == (0.3, 1.6, 0.1)
-    assert "have separate offsets" in "".join(
+    assert "get new offsets" in "".join(
         daemon_run.lines(ROBOT, data.model_copy(update={"poses": data.poses[:3]}))
     )
 

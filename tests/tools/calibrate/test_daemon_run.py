@@ -173,7 +173,7 @@ def test_a_fault_ends_the_measurement_and_keeps_readings(
     measurement.daemon.faulty, measurement.daemon.limit = {-0.1}, limit
     with pytest.raises(TripError, match="the motion was ended: axis 1: slack") as caught:
         measurement.run()
-    assert "the same command continues after them" in caught.value.__notes__[0]
+    assert "the same command continues after these poses" in caught.value.__notes__[0]
     data = load_data(measurement.folder / "data.json")
     assert len(data.tried) == tried and 1 <= len(data.poses) < 5
 

@@ -112,7 +112,7 @@ def test_new_drives_get_stored_node_ids(tmp_path: Path) -> None:
         assert result["set"] == {"node_id": 5, "bitrate_bit_s": None, "stored": True}
         assert answers(name, 5)
         message = refused(2, bus, "--node-id", "5")
-        assert "--node-id 5: taken by another node (it answers to SDO)" in message
+        assert "--node-id 5: taken by another node (it answers SDO requests)" in message
         found = told(bus, *TYPE, "--serial", "2")["found"]
         assert [(one["serial"], one["node_id"]) for one in found] == [(2, 5)]
         told(bus, *TYPE, "--serial", "2", "--node-id", "7")
@@ -188,7 +188,8 @@ def test_an_enabled_drive_gets_no_node_id() -> None:
         network.send_message(0, bytes([2, 1]))  # stopped: it does not answer SDO
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
         assert (
-            "node 1 does not report whether its power stage is enabled: no answer to SDO" in message
+            "node 1 does not report whether its power stage is enabled: it does not answer"
+            in message
         )
 
 

@@ -292,7 +292,9 @@ def test_recordings_of_several_robots_cannot_be_exported_together(
     for command, name in (("export", "x.csv"), ("export", "x.parquet"), ("plot", "x.png")):
         status, _, errors = _log(command, tmp_path, "--out", tmp_path / name)
         assert status == 2 and errors.count("\n") == 1
-        assert f"{second}: is of bench with 3 axes, but earlier files are of bench with 2" in errors
+        assert (
+            f"{second}: records bench with 3 axes, but earlier files record bench with 2" in errors
+        )
         assert not (tmp_path / name).exists()
     assert capfd.readouterr().err == ""  # no warning about an unfinished table
     assert len(_done("info", tmp_path)["recordings"]) == 2

@@ -9,7 +9,7 @@ from cdpr_tools.style import canvas, legend_above, legend_beside_title
 
 
 @pytest.mark.parametrize(
-    ("words", "same_line"), [("way", True), ("way of the platform, and its target", False)]
+    ("words", "same_line"), [("way", True), ("path of the platform, and its target", False)]
 )
 def test_a_title_moves_above_the_legend_if_there_is_no_room(words: str, same_line: bool) -> None:
     figure, (ax, _) = canvas(1, 2)

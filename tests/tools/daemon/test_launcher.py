@@ -355,7 +355,7 @@ def test_a_socket_of_another_process_does_not_make_the_daemon_ready(
         assert daemon.process.stdout is not None
         told = [json.loads(line) for line in daemon.process.stdout]
     assert not any("ready" in line for line in told)
-    assert "the service could not begin" in told[-1]["reason"]
+    assert "the service could not start" in told[-1]["reason"]
     assert daemon.ends() == 1
 
 
@@ -438,7 +438,7 @@ def test_a_loop_that_cannot_start_ends_the_daemon_with_its_status(
     start: Start, status: int
 ) -> None:
     daemon = start({"refuse": status})
-    assert "could not begin" in daemon.line("reason")["reason"]
+    assert "could not start" in daemon.line("reason")["reason"]
     assert daemon.ends() == status
 
 
@@ -447,7 +447,7 @@ def test_a_service_that_cannot_start_ends_the_daemon_after_retries(
     start: Start, status: int, times: int
 ) -> None:
     daemon = start({"refuse_service": status})
-    assert "the service could not begin" in daemon.line("reason")["reason"]
+    assert "the service could not start" in daemon.line("reason")["reason"]
     assert daemon.ends() == status
     assert daemon.log().count("service refused") == times
 

@@ -147,7 +147,7 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
                 "`cdpr enable`",
                 "look at the platform, which has come down; if it stands at home, upright: "
                 "`cdpr tighten --from home`",
-                "`cdpr sim fault bench put-back` carries the platform back to its start",
+                "`cdpr sim fault bench put-back` carries the platform back to its start pose",
             ],
         ),
     ],
@@ -232,7 +232,7 @@ def test_a_dead_loop_is_shown_with_old_values_marked_as_such(
 def test_a_hanging_loop_is_reported_before_older_values() -> None:
     status = status_of(program="hold") | {"driving": True, "loop": {"silent_s": 13.6}}
     lines = [str(line) for line in status_text(status)[:-1]]
-    assert lines[1] == "the loop has run no cycle for 13.6 s: the following is that old"
+    assert lines[1] == "the loop has run no cycle for 13.6 s: the values below are that old"
     assert lines[2].startswith("drives that had power stop without its heartbeat")
     # in lockstep, the time of the simulated drives stands too
     lines = [str(line) for line in status_text(status | {"lockstep": True})[:-1]]

@@ -180,9 +180,7 @@ def test_a_truncated_recording_is_reported_unless_another_file_continues_it(
 ) -> None:
     path, _ = ends_active(tmp_path, "active")
     path.write_bytes(path.read_bytes()[:-100])
-    assert "ends while the robot was active: its writer was killed, or is a daemon of" in shown(
-        path
-    )
+    assert "ends while the robot was active: its writer was killed, or a daemon of" in shown(path)
     with path.open("ab"):
         live = shown(path)
     assert "MB, still being recorded" in live

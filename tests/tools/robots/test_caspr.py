@@ -104,7 +104,7 @@ def test_tensions_beyond_the_winches_are_not_taken_and_named(tmp_path: Path) -> 
         ("no xml", cables(), "is not XML"),
         (BODIES, cables(EXITS[:2]), "2 cables make it planar-2; allowed: planar-3"),
         (BODIES, cables().replace("<link>0", "<link>1"), "attachments"),
-        (BODIES, cables().replace('"basic"', '"new"', 1), "none is called 'new'"),
+        (BODIES, cables().replace('"basic"', '"new"', 1), "no set is called 'new'"),
     ],
 )
 def test_a_model_that_cannot_be_imported_is_rejected_with_file_and_element(

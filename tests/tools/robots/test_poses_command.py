@@ -45,7 +45,7 @@ def test_planar_poses_from_another_place_are_written_as_toml(tmp_path: Path) -> 
         tmp_path / "plane.png",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "3 poses of 3 drawn; ways cut short by contact 0" in done.stdout
+    assert "3 poses of 3 drawn; 0 ways cut short by contact" in done.stdout
     assert "no possible contacts" in done.stdout
     points = tomllib.loads(table.read_text())["points"]
     assert len(points) == 3 and all(len(point["position_m"]) == 2 for point in points)

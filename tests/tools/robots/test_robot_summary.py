@@ -32,7 +32,7 @@ def test_a_share_just_below_100_percent_is_not_rounded_to_100() -> None:
 def test_the_summary_tells_whether_a_slipping_cable_is_detected() -> None:
     for name, allowed, text in (
         ("spatial-8", True, "more than 27.5 mm end a motion"),
-        ("suspended-6", False, "a cable that slips, and stays tight, is not noticed"),
+        ("suspended-6", False, "a cable that slips but stays tight is not noticed"),
     ):
         robot = load_robot(name)
         assert robot.platform is not None

@@ -104,7 +104,7 @@ def test_a_missing_cluster_is_reported() -> None:
 def test_the_nearest_place_is_reported_if_none_is_held() -> None:
     done = cdpr_here("robot", "workspace", "spatial-8", "--margin", "85", *COARSE)
     assert done.returncode == 1
-    assert "nearest to it is" in done.stderr and "N short" in done.stderr
+    assert "the nearest place is" in done.stderr and "N too small" in done.stderr
 
 
 def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:

@@ -45,7 +45,7 @@ def test_an_offset_load_cell_is_reported_and_motion_continues(robot: LockstepRob
     (told,) = notices(robot)
     assert told.startswith(f"{name}: its load cell shows ")
     assert 25.0 < float(told.split(" shows ")[1].split(" N ")[0]) < 45.0
-    assert " N more than by its motor" in told
+    assert " N more than its motor" in told
     robot.inject(axis=AXIS, sub=CELL_OFF, value=0)
     robot.carry_out("pose", position_m=[0.0, 1.5])
     robot.run(3.0)
