@@ -19,5 +19,5 @@ from cdpr_rt.arrays import rms
         ([1.0, math.nan], math.nan),
     ],
 )
-def test_rms_of_numbers_and_of_vector_lengths(values: list, value: float) -> None:  # type: ignore[type-arg]
+def test_rms_is_taken_over_numbers_or_vector_lengths(values: list, value: float) -> None:  # type: ignore[type-arg]
     assert rms(np.array(values)) == pytest.approx(value, nan_ok=True)

@@ -56,7 +56,7 @@ def test_a_file_imports_modules_of_its_folder_but_they_replace_no_installed_one(
         ("", "give FILE.py:NAME or MODULE:NAME"),
     ],
 )
-def test_what_cannot_be_loaded_is_named(tmp_path: Path, reference: str, text: str) -> None:
+def test_code_that_cannot_be_loaded_is_named(tmp_path: Path, reference: str, text: str) -> None:
     file = tmp_path / "mine.py"
     file.write_text("")
     named = reference.format(file)

@@ -18,7 +18,7 @@ def ramp(seconds=40.0):
     return time, SPEED * time, np.full(time.size, SPEED)
 
 
-def test_figures_of_a_known_oscillation():
+def test_figures_agree_with_a_known_oscillation():
     time, setpoint, velocity = ramp()
     swing = math.radians(0.5) * np.sin(2 * math.pi * 2.0 * time)
     effort = 0.3 + 0.01 * np.sin(2 * math.pi * 2.0 * time)

@@ -75,7 +75,7 @@ def writing(w_matrix: FloatArray, *_: FloatArray) -> FloatArray:
         (writing, "ValueError: .*read-only"),
     ],
 )  # fmt: skip
-def test_what_a_function_gets_wrong_is_named(function: Callable[..., object], text: str) -> None:
+def test_each_error_of_the_function_is_reported(function: Callable[..., object], text: str) -> None:
     found = BUILT_IN.copy()
     with pytest.raises(TensionDistributionError, match=text):
         own(function).solve(W, WRENCH, BUILT_IN, found)

@@ -219,7 +219,7 @@ def test_the_isosurface_of_random_values_is_closed_and_has_its_volume(
     assert volume(vertices, triangles) > 0.0
 
 
-def test_the_volume_of_a_ball_ends_at_the_grid() -> None:
+def test_the_volume_of_a_ball_is_cut_off_at_the_grid() -> None:
     values, low, spacing = ball(0.8, 41)
     whole = volume(*isosurface(values, low, spacing))
     assert whole == pytest.approx(4.0 / 3.0 * math.pi * 0.8**3, rel=5e-3)
@@ -230,7 +230,7 @@ def test_the_volume_of_a_ball_ends_at_the_grid() -> None:
     )
 
 
-def test_the_area_of_a_disc() -> None:
+def test_the_computed_area_of_a_disc_is_right() -> None:
     values, _, spacing = ball(0.8, 61)
     across = values[:, :, 30]
     assert area(across, spacing[0] ** 2) == pytest.approx(math.pi * 0.64, rel=5e-3)

@@ -26,7 +26,7 @@ def ends_mm(path: PathDescription) -> list[list[float]]:
     return [[round(1e3 * x, 6) for x in move.end[:3]] for move in path.moves]
 
 
-def test_units_distance_modes_and_line_numbers():
+def test_units_and_distance_modes_apply_to_the_lines_after_them():
     path = read(
         "%", "O1000 (a part)", "N10 G21 G90 ; mm", "G0 X10 Y20. Z-3", "g1 x30 f600", "G91", "Y5",
         "G90 G20", "X1.0 F60", "G4 P0.5", "M0", "M2",

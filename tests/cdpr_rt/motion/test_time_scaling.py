@@ -162,7 +162,7 @@ def test_limited_wrenches_slow_the_path_down():
     assert plan.duration_s > 1.3 * timed(nodes).duration_s
 
 
-def test_a_path_of_one_place_rests():
+def test_a_path_without_length_stays_at_rest():
     path = polyline([[0.1] * 6, [0.1] * 6], 0.01, dwell_s=0.5)
     plan = timed(nodes_of(path, SCALE))
     assert plan.duration_s == pytest.approx(0.5)

@@ -154,7 +154,7 @@ def test_a_cable_is_cut_while_the_robot_runs(
 
 
 @pytest.mark.parametrize("size", [1, 2, 4])
-def test_any_size_of_zero_ends_the_silence(
+def test_a_zero_of_any_size_ends_the_silence(
     robot: Robot, size: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot.fault("silence", axis="lower")

@@ -69,7 +69,7 @@ def test_a_number_out_of_range_is_reported_in_the_typed_units(
     assert str(raised.value) == text
 
 
-def test_a_number_without_an_option_is_reported_in_the_loops_words() -> None:
+def test_a_number_without_an_option_is_reported_as_the_loop_does() -> None:
     refusal = CommandRefusal(
         RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None}
     )

@@ -112,7 +112,7 @@ node_id = 1
 
 
 @pytest.mark.parametrize("kind", ["planar-3", "suspended-8"])
-def test_the_speed_is_what_the_winches_can_do(kind: str, tmp_path: Path) -> None:
+def test_the_default_speed_makes_use_of_fast_winches(kind: str, tmp_path: Path) -> None:
     (tmp_path / "fast.toml").write_text(WINCH_OF_2_m_s)
     path = tmp_path / "mine.toml"
     given = {"kind": kind, "winch": "fast.toml"}
@@ -127,13 +127,13 @@ def test_the_speed_is_what_the_winches_can_do(kind: str, tmp_path: Path) -> None
     assert kind == "suspended-8" or platform.mass_kg == 2.0
 
 
-def test_a_speed_above_what_the_winches_can_do_is_asked_again(tmp_path: Path) -> None:
+def test_a_speed_that_the_winches_cannot_reach_is_asked_again(tmp_path: Path) -> None:
     (tmp_path / "fast.toml").write_text(WINCH_OF_2_m_s)
     with pytest.raises(BadInputError, match=r"speed_m_s: value '3'; allowed: a number from 0.001"):
         answers_of(tmp_path / "mine.toml", {"winch": "fast.toml", "speed_m_s": "3"}, usual)
 
 
-def test_the_box_of_a_wide_and_low_frame_is_all_of_targets(tmp_path: Path) -> None:
+def test_targets_fill_the_box_of_a_wide_and_low_frame(tmp_path: Path) -> None:
     given = {"kind": "point-4", "frame_m": "80 50 20"}
     found = found_wrong(tmp_path / "stadium.toml", given)
     # the smallest winches that hold the platform are proposed, and cables of 50 m sag in their pull
@@ -204,7 +204,7 @@ def test_defaults_follow_from_the_exit_points(tmp_path: Path) -> None:
     assert [axis.name for axis in robot.axes] == ["cable 1", "cable 2", "cable 3"]
 
 
-def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
+def test_a_question_is_asked_again_until_its_answer_is_valid(tmp_path: Path) -> None:
     answers = ["", "Wall robot", "winch-mpp0932d", "", "socketcan:can1", "1, 1, 2", "4 5 6"]
     answers += ["0, 2.5", "3, 2.5", "", "", "here", "0.1, 0.1", "-1", "0.2", "", "", ""]
     answers += ["400", "4", "1e9", "140", "150", "15", "", "1.5"]
@@ -251,7 +251,7 @@ def test_a_question_says_where_its_default_comes_from(tmp_path: Path) -> None:
         assert f"default: {origin}" in path.read_text()
 
 
-def test_what_a_rejection_names_is_asked_again(tmp_path: Path) -> None:
+def test_the_question_that_a_rejection_names_is_asked_again(tmp_path: Path) -> None:
     path = tmp_path / "heavy.toml"
     answers = *[""] * 17, "80", *[""] * 4, "1.5"
     done = cdpr_here("robot", "new", path, stdin="\n".join(answers) + "\n")
@@ -361,7 +361,7 @@ def test_two_answers_to_one_question_are_rejected(tmp_path: Path) -> None:
     assert "--set kind: given as 'planar-3' and 'planar-4'; give it once" in done.stderr
 
 
-def test_a_point_that_is_a_default_is_mended_by_the_size(tmp_path: Path) -> None:
+def test_the_size_is_asked_again_if_a_default_point_is_at_fault(tmp_path: Path) -> None:
     answers = usual_answers("planar-4")
     found = [
         Finding("axes[2].anchor_point_m", "", impossible=True),
@@ -436,7 +436,7 @@ def _require_works(path: Path, head: str, axes: list[str]) -> None:
     ("kind", "above"),
     [("planar-4", False), ("suspended-6", True), ("suspended-8", False), ("spatial-8", True)],
 )
-def test_one_more_cable_straight_below_or_above_the_middle(
+def test_a_further_cable_straight_below_or_above_the_middle_works(
     kind: str, above: bool, tmp_path: Path
 ) -> None:
     path = tmp_path / "mine.toml"

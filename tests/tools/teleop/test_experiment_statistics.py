@@ -44,7 +44,7 @@ def row(variable: str, level: str) -> dict:
     return next(r for r in rows(POINTS) if (r["variable"], r["level"]) == (variable, level))
 
 
-def test_means_and_three_sigma_of_each_level() -> None:
+def test_each_level_has_its_mean_and_three_sigma() -> None:
     of_scale = row(SCALE, "8:1")
     assert of_scale["mean_mm"] == pytest.approx([0.2, -0.1], abs=0.12)
     assert of_scale["three_sigma_mm"] == pytest.approx([2.7, 2.7], rel=0.1)

@@ -77,7 +77,7 @@ def test_a_script_lifts_and_turns_the_hand_steadily(tmp_path: Path) -> None:
     assert seen.quaternion == pytest.approx((math.cos(half), 0.0, -math.sin(half), 0.0))
 
 
-def test_keys_lift_and_turn_about_the_room_s_axes() -> None:
+def test_keys_lift_and_turn_about_the_axes_of_the_room() -> None:
     keys = Keys(scale=1.0)
     for key in "+" * 4 + "rrf" + "uuukkl":
         keys.press(key, TICK_S)

@@ -53,7 +53,7 @@ def slanted(ripple_m: float) -> object:
     return recorded(true, setpoint, [{"mark": "line", **ends}, {"mark": "line end", "row": 5000}])
 
 
-def test_a_line_s_error_is_the_distance_from_it():
+def test_the_error_of_a_line_is_the_distance_from_it():
     parts = {line.WITH: slanted(1e-3), line.WITHOUT: slanted(4e-3)}
     found = figures_of(line.judge(parts, line.SPEED_m_s))
     assert found["path_with_mm"].value == pytest.approx(1.0 / np.sqrt(2.0), rel=0.01)
