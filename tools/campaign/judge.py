@@ -15,6 +15,7 @@ from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.diagnosis.predictions import Loss, Swing, corner_swings, slips
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.model.robot_arrays import limits_of
+from cdpr_sim_bus.cia402.faults import FAULTS
 from cdpr_tools.campaign.play import Played
 from cdpr_tools.campaign.scenario import BEFORE_BOOT
 
@@ -138,16 +139,22 @@ class Judge:
 
     def sure(self, cause: Cause) -> bool:
         """Return whether no running robot may miss a fault."""
+        others = [other.at_s for other in self.causes if other is not cause]
+        if cause.name in _SURE or any(abs(at_s - cause.at_s) < _ALONE_S for at_s in others):
+            return cause.name in _SURE
         then = self.truth[: np.searchsorted(self.truth["time_s"], cause.at_s) + 1][-1]
         tight = bool((then["tension_N"] > 2.0 * np.asarray(self.limits.tension_min_N)).all())
+        amount = FAULTS[cause.name].amount(cause.value)
         if cause.name == "slip":
-            slip_m = 1e-3 * float(cause.value or 0.0)
-            return tight and slip_m > predicted(self.played.scenario.robot).unnoticed_m[cause.axis]
+            unnoticed_m = predicted(self.played.scenario.robot).unnoticed_m
+            return tight and 1e-3 * amount > unnoticed_m[cause.axis]
         if cause.name == "encoder-jump":
-            winch = self.robot.axes[cause.axis].winch
-            turned = abs(float(cause.value or 0.0)) / winch.encoder_counts_per_turn
-            return bool(turned * math.tau > _SURE_JUMP_rad)
-        return cause.name in _SURE or (cause.name == "cut-cable" and tight)
+            turns = abs(amount) / self.robot.axes[cause.axis].winch.encoder_counts_per_turn
+            return turns * math.tau > _SURE_JUMP_rad
+        if cause.name == "silence":
+            tolerated_s = self.limits.missed_cycles * self.robot.sync_period_s
+            return 1e-3 * amount > 2.0 * tolerated_s
+        return cause.name == "cut-cable" and tight
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""
@@ -253,8 +260,9 @@ _SURE: Final = (
     "bus-off", "bus-lost", "emcy-flood",
 )  # fmt: skip
 """Faults that no running robot may miss."""
+_ALONE_S: Final = 0.5
 _SURE_JUMP_rad: Final = 1.0
-"""The same for jumps of an encoder: more than a motor turns in some cycles."""
+"""Jump of an encoder that no running robot may miss: more than a motor turns in some cycles."""
 
 
 # The invariants. Each yields what was violated.
