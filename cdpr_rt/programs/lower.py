@@ -264,12 +264,13 @@ class LowerProgram(PlatformProgram):
             self._at_rest = not low_N.any()
             if self._stage == "down":
                 if self._still * period_s <= _STILL_S:
+                    self._trouble = f"the platform did not come to rest within {self._down_s:.0f} s"
+                elif winches.stuck.any():
+                    name = self._parts.names[int(winches.stuck.argmax())]
+                    self._trouble = f"{name} was pushed to pay out cable and did not turn"
+                if self._trouble:
                     self._parts.last_stop.fallen = True
-                    self._trouble = (
-                        f"the platform did not come to rest within {self._down_s:.0f} s; it "
-                        "may fall "
-                        "when the power goes off"
-                    )
+                    self._trouble += "; if the platform hangs, it may fall when the power goes off"
                 self._stage = "fade"
                 low_N[winches.left_m > 0.0] = 0.0
                 winches.left_m[:] = 0.0

@@ -374,6 +374,21 @@ def test_a_platform_that_keeps_sinking_is_reported_and_counts_as_fallen(
     assert robot.parts.last_stop.fallen
 
 
+def test_a_winch_that_does_not_turn_is_reported_and_the_platform_counts_as_fallen() -> None:
+    robot = tightened(Standing())
+    robot.switch("lower", {"blind": True})
+    held_rad, told = robot.angle[2], robot.program.progress()
+    for _ in range(20_000):
+        robot.run(PERIOD_S)
+        robot.angle[2], robot.speed[2] = held_rad, 0.0
+        if (told := robot.program.progress())["done"]:
+            break
+    assert told["done"]
+    assert "lower was pushed to pay out cable and did not turn" in told["trouble"]
+    assert "may fall when the power goes off" in told["trouble"]
+    assert robot.parts.last_stop.fallen
+
+
 def test_the_index_path_turns_every_motor_by_a_whole_turn():
     platform = ROBOT.platform
     assert platform is not None
