@@ -62,8 +62,8 @@ class Predicted:
     """Tension of each cable after a slip, or at the full torque of its motor."""
     off_m: FloatArray
     """Error of the platform's position by an unnoticed slip of each cable."""
-    unnoticed_m: FloatArray
-    """The largest slip of each cable that is not noticed."""
+    sudden_m: FloatArray
+    """The largest sudden slip of each cable that is not noticed."""
 
 
 @lru_cache(maxsize=1)
@@ -81,7 +81,7 @@ def predicted(robot: str) -> Predicted:
         [worst(i, lambda swing: swing.fastest_m_s) for i in range(s.n)],
         [worst(i, lambda swing: swing.aside_m) for i in range(s.n)],
         *(_OVER * np.array([getattr(slip, name) for slip in slipped])
-          for name in ("peak_N", "off_m", "unnoticed_m")),
+          for name in ("peak_N", "off_m", "sudden_m")),
     )  # fmt: skip
 
 
@@ -139,15 +139,19 @@ class Judge:
 
     def sure(self, cause: Cause) -> bool:
         """Return whether no running robot may miss a fault."""
-        others = [other.at_s for other in self.causes if other is not cause]
+        others = [
+            other.at_s
+            for other in self.causes
+            if other is not cause and other.name not in (*_ON_THE_BUS, "frames-late")
+        ]
         if cause.name in _SURE or any(abs(at_s - cause.at_s) < _ALONE_S for at_s in others):
             return cause.name in _SURE
         then = self.truth[: np.searchsorted(self.truth["time_s"], cause.at_s) + 1][-1]
         tight = bool((then["tension_N"] > 2.0 * np.asarray(self.limits.tension_min_N)).all())
         amount = FAULTS[cause.name].amount(cause.value)
         if cause.name == "slip":
-            unnoticed_m = predicted(self.played.scenario.robot).unnoticed_m
-            return tight and 1e-3 * amount > unnoticed_m[cause.axis]
+            sudden_m = predicted(self.played.scenario.robot).sudden_m
+            return tight and 1e-3 * amount > sudden_m[cause.axis]
         if cause.name == "encoder-jump":
             turns = abs(amount) / self.robot.axes[cause.axis].winch.encoder_counts_per_turn
             return turns * math.tau > _SURE_JUMP_rad
@@ -260,6 +264,13 @@ _SURE: Final = (
     "bus-off", "bus-lost", "emcy-flood",
 )  # fmt: skip
 """Faults that no running robot may miss."""
+_NAMED_AS: Final = {
+    "encoder-jump": ("encoder_jump",),
+    "cut-cable": ("broken_cable",),
+    "slip": ("broken_cable", "lengths", "lengths_jump"),
+    "silence": ("missed", "stale", "drive"),
+}
+"""Limits by which some faults must be named."""
 _ALONE_S: Final = 0.5
 _SURE_JUMP_rad: Final = 1.0
 """Jump of an encoder that no running robot may miss: more than a motor turns in some cycles."""
@@ -330,7 +341,12 @@ def causes_are_named(j: Judge) -> Iterator[str]:
     for cause in j.causes:
         if not j.works_at(cause.at_s) or not j.sure(cause):
             continue
-        if not any(fault["axis"] == cause.axis or cause.explains(fault) for fault in named):
+        limits = _NAMED_AS.get(cause.name)
+        if not any(
+            (fault["axis"] == cause.axis or cause.explains(fault))
+            and (limits is None or fault["limit"] in limits)
+            for fault in named
+        ):
             yield f"{cause.name} of axis {cause.axis + 1} is not named"
 
 
