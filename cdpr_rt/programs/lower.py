@@ -265,7 +265,7 @@ class LowerProgram(PlatformProgram):
             if self._stage == "down":
                 if self._still * period_s <= _STILL_S:
                     self._trouble = f"the platform did not come to rest within {self._down_s:.0f} s"
-                elif winches.stuck.any():
+                elif winches.stuck.any() and not self._parts.last_stop.fallen:
                     name = self._parts.names[int(winches.stuck.argmax())]
                     self._trouble = f"{name} was pushed to pay out cable and did not turn"
                 if self._trouble:

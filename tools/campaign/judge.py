@@ -355,7 +355,10 @@ def falls_have_a_cause(j: Judge) -> Iterator[str]:
     for fall in j.falls():
         then = [status for status in j.played.statuses if status["at_s"] <= fall.end_s]
         reason = str(then[-1]["reason"]) if then else ""
-        cut = [at_s for name, at_s in j.played.done if name in ("power off", "die")]
+        unheard = then and any(f["code"] in _UNHEARD for f in then[-1]["faults"] or ())
+        by = ("power off", "die", "stall") if unheard else ("power off", "die")
+        cut = [at_s for name, at_s in j.played.done if name in by]
+        cut += [c.at_s for c in j.causes if c.name == "bus-lost" and unheard]
         unavoidable = (
             any(0.0 <= fall.off_s - at_s < _DEAD_WITHIN_S for at_s in cut)
             or "it may fall when the power goes off" in reason
@@ -363,6 +366,10 @@ def falls_have_a_cause(j: Judge) -> Iterator[str]:
         )
         if not unavoidable:
             yield f"{fall} without power: {reason}"
+
+
+_UNHEARD: Final = ("8130h", "silent", "no_heartbeat", "bus_lost")
+"""Codes of drives that have switched their power off because they do not hear the master."""
 
 
 def descents_are_predicted(j: Judge) -> Iterator[str]:
