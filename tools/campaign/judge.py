@@ -394,17 +394,17 @@ def what_matters_is_noticed(j: Judge) -> Iterator[str]:
     for name, limit in figures.items():
         over = (np.abs(j.truth[name]) > _OVER * np.broadcast_to(limit, (j.n,))) & calm[:, None]
         for axis in range(j.n):
-            if _longest(over[:, axis]) > _NOTICED_CYCLES:
+            if _longest(over[:, axis]) * j.robot.sync_period_s > _NOTICED_S:
                 yield f"axis {axis + 1}: {name} up to {np.abs(j.truth[name]).max():.0f} unnoticed"
     rows, moves = j.played.rows, j.during(lambda s: s["program"] in ("pose", "path"))
     if rows.size == j.truth.size:
         off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"], axis=1)
         allowed_m = _OFF_m + float(predicted(j.played.scenario.robot).off_m.max())
-        if _longest((off_m > allowed_m) & calm & moves) > _NOTICED_CYCLES:
+        if _longest((off_m > allowed_m) & calm & moves) * j.robot.sync_period_s > _NOTICED_S:
             yield f"the platform is up to {np.nanmax(off_m[calm & moves]):.3f} m from where it says"
 
 
-_NOTICED_CYCLES: Final = 250
+_NOTICED_S: Final = 0.25
 _OFF_m: Final = 0.03
 _STALL_S: Final = 1.1
 

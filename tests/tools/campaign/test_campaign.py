@@ -126,7 +126,7 @@ _TAMPERED: dict[str, Callable[[Played], Played]] = {
     "descents_are_predicted": lambda p: _changed(p, "velocity_m_s", -1, -9.0),
     "causes_are_true": lambda p: _with_cause(p, axis=0),
     "causes_are_named": lambda p: _with_cause(p, axis=0),
-    "what_matters_is_noticed": lambda p: _changed(p, "tension_N", (slice(280), 1), 200.0),
+    "what_matters_is_noticed": lambda p: _changed(p, "tension_N", (slice(None), 1), 200.0),
     "limits_are_kept": lambda p: _changed(p, "tension_N", (0, 1), 200.0),
     "tensions_are_predicted": lambda p: _changed(p, "tension_N", (-1, 1), 2000.0),
     "commands_are_answered": lambda p: _reply(p, ok=False, text=""),
