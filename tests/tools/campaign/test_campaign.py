@@ -180,6 +180,6 @@ def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
 def test_fixed_seeds_violate_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """They draw almost every fault and command, for the robot as it is shipped."""
     monkeypatch.setenv("XDG_CONFIG_HOME", "/nonexistent")
-    seeds = ("--from", "70", "--seeds", "20", "--workers", "1")
+    seeds = ("--from", "60", "--seeds", "60", "--workers", "1")
     done = cdpr_here("sim", "campaign", ROBOT, *seeds, "--json")
     assert done.returncode == 0, done.stdout
