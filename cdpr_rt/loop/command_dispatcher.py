@@ -122,7 +122,8 @@ class CommandDispatcher:
                 stop.answer({"ok": True, "text": _OBEYED, "state": state})
         if self._urgent[0] != self._urgent_taken[0]:
             self._take(self._urgent_taken, self._engine.block.take_urgent)
-        if self._commands[0] != self._commands_taken[0]:
+        # its reply comes before the next command, so that no later stop is merged with it
+        elif self._commands[0] != self._commands_taken[0]:
             self._take(self._commands_taken, self._engine.block.take_command)
         elif self._deferred is not None and self._deferred.task.done:
             self._resume(self._deferred)
@@ -268,7 +269,7 @@ class CommandDispatcher:
         right = self._right("enable", command)
         if self._prepare(command, self._engine.parts.programs[name]):
             return None
-        return self._transitions.enable(name, self._arguments(command), right)
+        return self._transitions.enable(name, self._arguments(command), right, command["stops"])
 
     def _disable(self, _command: Command) -> Steps | None:
         self._refuse_read_only("disable")

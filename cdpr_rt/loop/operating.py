@@ -88,7 +88,7 @@ class Operator:
     def enable(self) -> None:
         """Enable the drives and release the brakes; the torque is zero."""
         self._refuse_when_stopped("the drives have power")
-        self._do(self._transitions.enable(HOLD, {}, 0))
+        self._do(self._transitions.enable(HOLD, {}, 0, self._engine.block.stops))
 
     def disable(self) -> None:
         """Apply the brakes and remove the power; cycles continue."""

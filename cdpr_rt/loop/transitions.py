@@ -215,10 +215,11 @@ class Transitions:
 
     # -- power
 
-    def enable(self, program: str, arguments: Mapping[str, Any], right: int) -> Steps:
+    def enable(self, program: str, arguments: Mapping[str, Any], right: int, stops: int) -> Steps:
         """Enable the drives, hold, release the brakes, then run `program`.
 
-        If the grant number `right` has expired by then, the drives keep holding.
+        If the grant number `right` has expired by then, the drives keep holding. The power stays
+        off if there were more than `stops` stops before it would be switched on.
         """
         engine, life, machine = self._engine, self._life, self._machine
         engine.parts.programs[program].check(arguments)
@@ -228,6 +229,8 @@ class Transitions:
         last = engine.parts.last_stop
         if last is not None:
             yield from self._runner.run_blocking(last.require_writable)
+        if engine.block.stops != stops:
+            raise RefusedError("enable: cancelled by a later stop")
         machine.power_on()
         life.enter(LoopState.ACTIVE)
         try:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cdpr_profiles import Robot
-from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.platform import DISTRIBUTIONS
 from cdpr_rt.arrays import FloatArray, read_only, real_array
 from cdpr_rt.code_loader import CodeError, load_allowed, load_registered_one, require_allowed
@@ -113,9 +113,13 @@ class OwnDistribution:
         """
         given = read_only(W), read_only(w_e), self._low_N, self._high_N, read_only(previous_N)
         try:
-            t = np.ascontiguousarray(real_array(self._function(*given)))
+            found = self._function(*given)
         except (Exception, SystemExit) as error:  # the latter must not end the loop's process
             raise self._error(f"{type(error).__name__}: {error}") from error
+        try:
+            t = np.ascontiguousarray(real_array(found))
+        except (TypeError, ValueError):
+            raise self._error(self._not_finite(found)) from None
         if t.shape != self._low_N.shape:
             raise self._error(self._not_finite(t))
         fault, i, most = _check(W, w_e, self._bounds_N, self._scale, t, t_out)
@@ -128,8 +132,9 @@ class OwnDistribution:
             off = abs(float(W[i] @ t + w_e[i]))
             raise self._error(f"W t + w is {off:.3g} in row {i + 1}; allowed: up to {most:.2g}")
 
-    def _not_finite(self, t: FloatArray) -> str:
-        shown = np.array2string(t, threshold=10)
+    def _not_finite(self, found: object) -> str:
+        array = isinstance(found, np.ndarray)
+        shown = np.array2string(np.asarray(found), threshold=10) if array else brief(repr(found))
         return f"returned {shown}; return {self._low_N.size} finite tensions in N"
 
     def _error(self, what: str) -> TensionDistributionError:

@@ -36,6 +36,8 @@ _OFF_SHARE: Final = 2e-3
 applies."""
 _NOTHING_m: Final = 1e-9
 _LARGEST_m: Final = 1000.0
+_TURN_rad: Final = 1e-9
+"""Smaller rotations are due to rounding."""
 
 
 def arc_by_centre(start: FloatArray, end: FloatArray, centre: FloatArray, clockwise: bool) -> Arc:
@@ -265,7 +267,7 @@ class _Reader:
         if self._turns and len(self._letters) > self._k + 1:
             found.notes.append(
                 f"{' '.join(sorted(self._turns))}: turns the platform from home, about X, Y or Z "
-                "of the room; it is not a rotary table"
+                "of the file; it is not a rotary table"
             )
         self._path.notices += found.notices()
         self._path.in_room = self._in_room
@@ -465,11 +467,11 @@ class _Reader:
 
     def _note_turn(self, start: FloatArray, target: FloatArray) -> None:
         """Note the rotary axis of a move; reject more than one, whose order is unknown."""
-        k = self._k
-        used = (start[k:] != 0.0) | (target[k:] != 0.0)
-        turned = [
-            letter for letter, is_used in zip(self._letters[k:], used, strict=True) if is_used
-        ]
+        k, places = self._k, np.array([start, target])
+        in_room = np.array([_times(self._turn, place) for place in places])  # as G53 gives them
+        most = [np.abs(one[:, k:]).max(axis=0) > _TURN_rad for one in (places, in_room)]
+        used = min(most, key=np.count_nonzero)
+        turned = [letter for letter, one in zip(self._letters[k:], used, strict=True) if one]
         if len(turned) > 1:
             raise _LineError(
                 f"{' '.join(turned)}: the orientation depends on a machine's order of rotations; "

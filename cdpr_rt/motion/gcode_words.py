@@ -279,7 +279,7 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
         if letter == "N":
             continue
         seconds = letter == "S" and "G4" in codes
-        output = letter == "P" and alone and not codes  # as in Mach3's M11 P1
+        output = letter == "P" and alone and "G" not in line.upper()  # as in Mach3's M11 P1
         if (letter in IDLE_LETTERS and not seconds) or letter in ignored or output:
             findings.ignore(number, letter)
         elif name in _IDLE_CODES:

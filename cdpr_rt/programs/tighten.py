@@ -658,6 +658,11 @@ class TightenProgram(PlatformProgram):
                 "pay out cable, and its encoder shows no motion: the encoder or the winch is "
                 "stuck; check both before you tighten again"
             )
+        if (noisy := self._winches.noisy).any():
+            return (
+                f"{self._parts.names[int(noisy.argmax())]}: its encoder shows mostly noise, so its "
+                "winch gets no torque; check its cable, shield and supply before you tighten again"
+            )
         if self._source.name == "home" and (dragged := self._slack.dragged(feedback.position_rad)):
             return dragged
         i = int(moved_m.argmax())

@@ -311,23 +311,25 @@ Token = Annotated[
 ]
 
 
+_ALL_STOPS: Final = 2**53
+
+
 def _stops_before(
     request: Request,
     seen: Annotated[
-        int | None,
+        int,
         Header(
             alias="X-Stops-Seen",
             ge=0,
-            le=2**53,
+            le=_ALL_STOPS,
             description="`stop_count` of the last status that the client has seen: a later stop "
             "cancels the request, also if the network delays the request. By default the number "
             "when the request arrives.",
         ),
-    ] = None,
+    ] = _ALL_STOPS,
 ) -> int:
     """Return the number of stops before a request."""
-    arrived = int(request.scope[STOPS_BEFORE])
-    return arrived if seen is None else min(seen, arrived)
+    return min(seen, int(request.scope[STOPS_BEFORE]))
 
 
 StopsBefore = Annotated[int, Depends(_stops_before)]
@@ -594,11 +596,9 @@ def _add_motion(app: FastAPI, service: Service) -> None:
         return await ask("set", body, token, request, wanted=body.wanted, stops=stops)
 
     @app.post("/lengths", responses=_REFUSALS)
-    async def lengths(
-        body: models.Set, request: Request, stops: StopsBefore, token: Token = None
-    ) -> models.Done:
+    async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
         """Set the present lengths of the cables: `cable_length_m`, one for each axis or null."""
-        return await ask("lengths", body, token, request, wanted=body.wanted, stops=stops)
+        return await ask("lengths", body, token, request, wanted=body.wanted)
 
 
 def _add_drives(app: FastAPI, service: Service) -> None:
@@ -616,7 +616,7 @@ def _add_drives(app: FastAPI, service: Service) -> None:
 
     @app.post("/object", responses=_REFUSALS)
     async def drive_object(
-        body: models.ObjectRequest, request: Request, stops: StopsBefore, token: Token = None
+        body: models.ObjectRequest, request: Request, token: Token = None
     ) -> models.DriveObject:
         """Read an object of a drive; or write an integer without power, with the right to move.
 
@@ -627,9 +627,7 @@ def _add_drives(app: FastAPI, service: Service) -> None:
             reply = await service.command("object", body.client, **fields)
         else:
             gone = request.is_disconnected
-            reply = await service.command_with_right(
-                "object", body.client, token, gone, stops=stops, **fields
-            )
+            reply = await service.command_with_right("object", body.client, token, gone, **fields)
         text, texts = _done(reply).text, service.drives
         data = bytes.fromhex(text.strip("-"))
         if texts is None or body.value is not None:

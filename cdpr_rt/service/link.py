@@ -173,7 +173,9 @@ class LoopLink:
         CommandTooLongError.
         """
         self._require_loop()
-        if do in STOPS:
+        if do not in STOPS:
+            self._require_cycles()
+        else:
             self.block.count_stop()
             # commands stay in order: a stop without a reply must come after all commands that may
             # start motion
@@ -181,6 +183,7 @@ class LoopLink:
         future = self._coalesced.get(do)
         if future is None or future.done():
             future = self._send(do, fields)
+        self._require_cycles()  # a silent loop obeys the stop if it continues
         try:
             return await asyncio.wait_for(asyncio.shield(future), wait_s)
         except TimeoutError:
@@ -193,6 +196,8 @@ class LoopLink:
             raise LoopGoneError(self.ended_how)
         if int(self.block.counters["loop_pid"][0]) == 0:
             raise LoopGoneError("the loop has not started yet")
+
+    def _require_cycles(self) -> None:
         if self.silent_s() > _SILENT_S:
             raise LoopGoneError(f"the loop has run no cycle for {self.silent_s():.1f} s")
 

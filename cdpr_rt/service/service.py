@@ -286,14 +286,16 @@ class Service:
         token: str | None,
         gone: Callable[[], Awaitable[bool]],
         *,
-        stops: int,
+        stops: int | None = None,
         **fields: Any,
     ) -> Reply:
         """Send a command that needs the right to move; renew that right while it is carried out.
 
         The right expires if the client has `gone` during that time. The loop starts no motion if
-        there were more than `stops` stops. Raises LeaseError and the errors of `LoopLink.command`.
+        there were more than `stops` stops, by default those until now. Raises LeaseError and the
+        errors of `LoopLink.command`.
         """
+        stops = self.block.stops if stops is None else stops
         right = self.lease.renew(token, moves=True).number
         self._note_stop()
         if self.procedures.is_ending:

@@ -52,6 +52,15 @@ class Stop(models.ClientRequest):
     id: int | None = None
 
 
+def _stop_in(text: str) -> Stop | None:
+    """Return the stop in a viewer's message; one with a wrong name or key is a stop too."""
+    with suppress(ValidationError):
+        return Stop.model_validate_json(text)
+    with suppress(ValueError, RecursionError, AttributeError):
+        return Stop(do=json.loads(text).get("do"))
+    return None
+
+
 _PROGRAM: Final = TypeAdapter(models.ProgramRequest)
 _SET: Final = TypeAdapter(models.Set)
 
@@ -320,15 +329,18 @@ class WebSocketRoutes:
             message = await socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            with suppress(ValidationError):
-                stop = Stop.model_validate_json(message.get("text") or "")
+            if stop := _stop_in(message.get("text") or ""):
                 obeying.add(task := asyncio.create_task(self._obey(socket, stop)))
                 task.add_done_callback(obeying.discard)
             await asyncio.sleep(0.05)
 
     async def _obey(self, socket: WebSocket, stop: Stop) -> None:
+        obeyed = asyncio.create_task(self._service.command(stop.do, stop.client))
+        with suppress(TimeoutError, WebSocketDisconnect):
+            # the reply may follow only when the platform has been lowered
+            await send(socket, json.dumps({"kind": "taken", "id": stop.id}))
         try:
-            reply = await self._service.command(stop.do, stop.client)
+            reply = await obeyed
             error = None if reply.ok else reply.text or "refused"
         except ControlError as failure:
             error = str(failure)

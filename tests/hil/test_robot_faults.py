@@ -152,8 +152,9 @@ def test_a_drive_that_goes_pre_operational_is_switched_off_in_time(
     truth = Truth(hanging)
     network.send(0, bytes([128, axis.node_id]))  # it keeps its last torque and its heartbeats
     hanging.run(0.05)
-    assert network.read_int(axis.node_id, 0x6041) & 0x6F == 0x40  # switch on disabled
     assert abs(height_m(truth.read())) < 0.02
+    hanging.run(0.07)  # its heartbeat comes every 0.1 s
+    assert network.read_int(axis.node_id, 0x6041) & 0x6F == 0x40  # switch on disabled
     assert speed_at_power_off_m_s(hanging, truth) < 0.02
     assert (
         "pre-operational" in hanging.loop.life.reason or "not answered" in hanging.loop.life.reason

@@ -44,13 +44,15 @@ def test_long_work_prints_progress_in_a_pipe(monkeypatch: pytest.MonkeyPatch) ->
     out, errors = Output(as_json=True), io.StringIO()
 
     def until(text: str) -> None:
+        end_s = time.monotonic() + 60.0
         while text not in errors.getvalue():
+            assert time.monotonic() < end_s, f"no {text!r} in {errors.getvalue()!r}"
             time.sleep(0.005)
 
     with redirect_stderr(errors):
         with out.stage("winding"):
             now_s += 7.0
-            until("winding: for 7 s now")
+            until("winding: running for 7 s")
         with out.progress("turns", 10.0) as advance:
             until("turns: 0 %")
             now_s += 40.0  # kernels are compiled before the motion

@@ -99,9 +99,16 @@ def _serve() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+def _interrupt_once(*_: object) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):  # a second one would interrupt the end
+        signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 def _end_with(parent: int) -> None:
     """End when the parent ends, as after an interrupt, so that temporary files are removed."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, _interrupt_once)
     end_with_launcher(parent)
 
 

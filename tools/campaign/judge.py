@@ -74,11 +74,11 @@ def predicted(robot: str) -> Predicted:
 
     def worst(i: int, figure: Callable[[Swing], float]) -> float:
         found = [*swings[Loss.CABLE][i], *swings[Loss.DRIVE][i], *swings[Loss.LENGTHS][0]]
-        return _OVER * max(map(figure, found), default=math.inf) + s.platform.speed_m_s
+        return _OVER * max(map(figure, found), default=math.inf)
 
     slipped = slips(s)
     return Predicted(
-        [worst(i, lambda swing: swing.fastest_m_s) for i in range(s.n)],
+        [worst(i, lambda swing: swing.fastest_m_s) + s.platform.speed_m_s for i in range(s.n)],
         [worst(i, lambda swing: swing.aside_m) for i in range(s.n)],
         *(_OVER * np.array([getattr(slip, name) for slip in slipped])
           for name in ("peak_N", "off_m", "sudden_m")),
@@ -146,8 +146,11 @@ class Judge:
         ]
         if cause.name in _SURE or any(abs(at_s - cause.at_s) < _ALONE_S for at_s in others):
             return cause.name in _SURE
-        then = self.truth[: np.searchsorted(self.truth["time_s"], cause.at_s) + 1][-1]
-        tight = bool((then["tension_N"] > 2.0 * np.asarray(self.limits.tension_min_N)).all())
+        before = int(np.searchsorted(self.truth["time_s"], cause.at_s)) - 1
+        if before < 0:
+            return False
+        tension_N = self.truth["tension_N"][before]
+        tight = bool((tension_N > 2.0 * np.asarray(self.limits.tension_min_N)).all())
         amount = FAULTS[cause.name].amount(cause.value)
         if cause.name == "slip":
             sudden_m = predicted(self.played.scenario.robot).sudden_m
@@ -181,7 +184,8 @@ class Judge:
         """Return whether a platform without power fell because something from outside changed."""
         times = [(cause.at_s, cause.end_s) for cause in self.causes if cause.name in _FROM_OUTSIDE]
         times += [(at_s, at_s) for name, at_s in self.played.done if name == "mend"]
-        changes = [(max(a, fall.off_s), b) for a, b in times]
+        # a push that began under power must not make the robot drop its platform
+        changes = [(a if a >= fall.off_s else b, b) for a, b in times if b >= fall.off_s]
         return any(a <= fall.began_s <= b + _RELEASED_S for a, b in changes)
 
     @property
@@ -218,9 +222,11 @@ class Cause:
         self.name, self.axis = str(fault["fault"]), int(fault["axis"] or 0) - 1
         self.at_s, self.value = began_s + fault["at_s"], fault["value"]
         ends_s = [
-            one["at_s"] for one in all_faults if one["fault"] == self.name and one["value"] == 0
+            began_s + one["at_s"]
+            for one in all_faults
+            if one["fault"] == self.name and one["value"] == 0
         ]
-        self.end_s = max([self.at_s, *(began_s + end_s for end_s in ends_s)])
+        self.end_s = min((end_s for end_s in ends_s if end_s >= self.at_s), default=self.at_s)
         """End of a push."""
 
     def explains(self, named: dict[str, Any]) -> bool:
@@ -337,7 +343,7 @@ def causes_are_named(j: Judge) -> Iterator[str]:
         yield "state fault without a reason"
     if j.ended or j.played.scenario.start == BEFORE_BOOT:
         return
-    named = [fault for fault, _, _ in j.named()]
+    named = list(j.named())
     for cause in j.causes:
         if not j.works_at(cause.at_s) or not j.sure(cause):
             continue
@@ -345,7 +351,8 @@ def causes_are_named(j: Judge) -> Iterator[str]:
         if not any(
             (fault["axis"] == cause.axis or cause.explains(fault))
             and (limits is None or fault["limit"] in limits)
-            for fault in named
+            and at_s >= cause.at_s
+            for fault, at_s, _ in named
         ):
             yield f"{cause.name} of axis {cause.axis + 1} is not named"
 
@@ -395,15 +402,26 @@ def what_matters_is_noticed(j: Judge) -> Iterator[str]:
         over = (np.abs(j.truth[name]) > _OVER * np.broadcast_to(limit, (j.n,))) & calm[:, None]
         for axis in range(j.n):
             if _longest(over[:, axis]) * j.robot.sync_period_s > _NOTICED_S:
-                yield f"axis {axis + 1}: {name} up to {np.abs(j.truth[name]).max():.0f} unnoticed"
-    rows, moves = j.played.rows, j.during(lambda s: s["program"] in ("pose", "path"))
-    if rows.size == j.truth.size:
-        off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"], axis=1)
-        allowed_m = _OFF_m + float(predicted(j.played.scenario.robot).off_m.max())
-        if _longest((off_m > allowed_m) & calm & moves) * j.robot.sync_period_s > _NOTICED_S:
-            yield f"the platform is up to {np.nanmax(off_m[calm & moves]):.3f} m from where it says"
+                most = np.abs(j.truth[name][over[:, axis], axis]).max()
+                yield f"axis {axis + 1}: {name} up to {most:.0f} unnoticed"
+    moves = calm & j.during(lambda s: s["program"] in ("pose", "path"))
+    off_m = _off_m(j, moves)
+    slipped = [cause.axis for cause in j.causes if cause.name in _LENGTHENS]
+    allowed_m = _OFF_m + float(predicted(j.played.scenario.robot).off_m[slipped].max(initial=0.0))
+    if _longest(off_m > allowed_m) * j.robot.sync_period_s > _NOTICED_S:
+        yield f"the platform is up to {off_m.max():.3f} m from where it says"
 
 
+def _off_m(j: Judge, moves: BoolArray) -> FloatArray:
+    """Return the error of each recorded position, 0 where it does not count; inf for nan."""
+    rows = j.played.rows
+    if rows.size != j.truth.size:  # there were SYNCs without a row, as in a stall
+        return np.zeros(1)
+    off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"], axis=1)
+    return np.where(moves, np.nan_to_num(off_m, nan=np.inf), 0.0)
+
+
+_LENGTHENS: Final = ("slip", "encoder-jump")
 _NOTICED_S: Final = 0.25
 _OFF_m: Final = 0.03
 _STALL_S: Final = 1.1

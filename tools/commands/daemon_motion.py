@@ -355,8 +355,8 @@ def tighten(
         LengthSource | None,
         option(
             "Source of the cable lengths: home (the platform stands there), the lengths of the "
-            "last stop, or the lengths that the daemon knows. Default: these, or home if it knows "
-            "none.",
+            "last stop, or those that the daemon knows. Default: what the daemon knows, else "
+            "home.",
             "--from",
         ),
     ] = None,

@@ -47,7 +47,7 @@ def campaign(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Play random users' actions and faults on simulated robots, and judge them.
+    """Play random user actions and faults on simulated robots, and judge how the robots react.
 
     A seed determines its scenario. The exit status is 1 if an invariant was violated.
     """

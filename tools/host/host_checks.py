@@ -134,7 +134,7 @@ def _cores() -> HostFinding:
     count = len(os.sched_getaffinity(0))
     if count >= 2:
         return HostFinding("processors", "ok", f"{count} usable")
-    remedy = "the loop needs a core of the machine alone: use two cores or more"
+    remedy = "the loop needs a core for itself: use a machine with two or more"
     return HostFinding("processors", "note", f"{count} usable", remedy)
 
 

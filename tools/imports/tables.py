@@ -333,7 +333,7 @@ def _read_optitrack(path: Path, rows: Iterator[_Row], digest: str) -> Table:
         above = [part[j] for part in (bodies, kinds) if j > 1 and j < len(part) and part[j]]
         name = " ".join([*above, axis]).strip() if j > 1 else (TIME if j == 1 else axis)
         if name in names:  # a marker of a body, measured and as fitted
-            name += f" ({types[j]})"
+            name += f" ({types[j] if j < len(types) else j})"
         names.append(name)
         if "Position" in above:
             units[name] = length
@@ -377,7 +377,7 @@ def _read_qualisys(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     """Read an export of Qualisys Track Manager: columns such as "Platform X", in mm.
 
     Lines of facts such as FREQUENCY stand above the names. Only the first name of a body contains
-    the body.
+    the body. A hidden body is at 0, 0, 0.
     """
     rows = dropwhile(lambda row: len(row[1][0]) > 1 and _QUALISYS_FACT.fullmatch(row[1][0]), rows)
     line, head = next(rows, (0, []))
@@ -385,11 +385,23 @@ def _read_qualisys(path: Path, rows: Iterator[_Row], digest: str) -> Table:
         problem = "no line of names with `Time`; export with column headers and time"
         raise ProfileError(path, f"line {line}" if line else "", problem)
     names, units, body = [], {TIME: "s"}, ""
+    faults: dict[str, ProfileError] = {}
     for cell in head:
         *above, axis = cell.rsplit(" ", 1)
         body = above[0] if above else body
-        name = TIME if cell == "Time" else f"{body} {axis}".strip()
+        name = TIME if cell == "Time" else f"{body} {axis}".strip() if cell else ""
         names.append(name)
         if axis in ("X", "Y", "Z"):
             units[name] = "mm"
-    return _table(path, digest, names, rows, units)
+        elif axis in ("Roll", "Pitch", "Yaw"):
+            problem = "is an Euler angle of unknown order; allowed: positions"
+            faults[name] = ProfileError(path, name, problem)
+    table = _table(path, digest, names, rows, units)
+    for name in names:
+        parts = [name[:-1] + axis for axis in "XYZ"]
+        place = [table.columns[part] for part in parts if part in names]
+        if name.endswith("X") and len(place) == len("XYZ"):
+            hidden = ~np.any(place, axis=0)
+            for values in place:
+                values[hidden] = np.nan
+    return replace(table, faults=table.faults | faults)

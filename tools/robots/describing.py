@@ -185,11 +185,10 @@ def _saved(answers: Answers, form: _Form, name: str, *, replace: bool) -> dict[s
         raise BadInputError(f"name {name!r}: a shipped robot has this name; choose another")
     path = _file(name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with replacing(path) if replace else path.open("xb") as file:
-            file.write(text_of(answers).encode())
-    except FileExistsError:
-        raise BadInputError(f"{path}: already exists; confirm that it is to be replaced") from None
+    if path.exists() and not replace:
+        raise BadInputError(f"{path}: already exists; confirm that it is to be replaced")
+    with replacing(path) as file:
+        file.write(text_of(answers).encode())
     return {"file": str(path)}
 
 

@@ -123,11 +123,12 @@ export interface LiveListener {
   connected(value: boolean): void;
 }
 
-interface Answer { ok: boolean; error: string | null }
+interface Answer { kind?: "taken" | "reply"; ok: boolean; error: string | null }
 
 let live: WebSocket | null = null;
 let stops = 0;
 const stopping = new Map<number, (answer: Answer) => void>();
+const later = (ms: number): Promise<null> => new Promise((resume) => setTimeout(resume, ms, null));
 const SOON_MS = 300;
 
 /**
@@ -136,16 +137,24 @@ const SOON_MS = 300;
  * All pages of a browser share six connections for requests, which others may occupy for minutes.
  */
 export async function stop(what: "hold" | "disable"): Promise<void> {
-  const id = ++stops, order = { client: clientName() };
-  const open = live?.readyState === WebSocket.OPEN;
-  const answered = new Promise<Answer>((resolve) => stopping.set(id, resolve));
-  if (open) live!.send(JSON.stringify({ ...order, do: what, id }));
-  let answer = await Promise.race([answered, new Promise<null>((resume) => setTimeout(resume, open ? SOON_MS : 0, null))]);
+  const id = ++stops, order = { client: clientName() }, socket = live;
+  const open = socket?.readyState === WebSocket.OPEN;
+  const closed = new Promise<null>((resolve) => socket?.addEventListener("close", () => resolve(null)));
+  let take = (): void => {}, reply = (_: Answer): void => {};
+  const taken = new Promise<true>((resolve) => (take = () => resolve(true)));
+  const answered = new Promise<Answer>((resolve) => (reply = resolve));
+  stopping.set(id, (answer) => (answer.kind === "taken" ? take() : reply(answer)));
   const asking = new AbortController();
-  answer ??= await Promise.race([answered, request("POST", `/${what}`, order, {}, asking.signal).then(() => null)]);
-  asking.abort(); // a request that still waits for a connection must not stop a later motion
-  stopping.delete(id);
-  if (answer && !answer.ok) throw new Rejected(answer.error ?? "refused");
+  try {
+    if (open) socket!.send(JSON.stringify({ ...order, do: what, id }));
+    const heard = open && (await Promise.race([taken, answered, later(SOON_MS)]));
+    const ended = heard ? closed : request("POST", `/${what}`, order, {}, asking.signal).then(() => null);
+    const answer = await Promise.race([answered, ended]);
+    if (answer && !answer.ok) throw new Rejected(answer.error ?? "refused");
+  } finally {
+    asking.abort(); // a request that still waits for a connection must not stop a later motion
+    stopping.delete(id);
+  }
 }
 
 /** Follow the daemon for as long as the page is open; a lost connection is tried again. */
@@ -176,7 +185,7 @@ function watch(socket: WebSocket, listener: LiveListener): Promise<void> {
       if (message.kind === "cycle") listener.cycle(message);
       else if (message.kind === "status") listener.status(message.status);
       else if (message.kind === "event") listener.event(message.event);
-      else if (message.kind === "reply") stopping.get(message.id)?.(message);
+      else if (message.kind === "reply" || message.kind === "taken") stopping.get(message.id)?.(message);
       else if (message.kind === "description") listener.description(message.description);
       listener.connected(true);
     };

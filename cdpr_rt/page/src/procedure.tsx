@@ -8,6 +8,7 @@ import "./procedure.css";
 
 const LOOK_MS = 500;
 let latest: Job | null = null;
+let endPolling = (): void => {};
 
 /** Return the procedure that runs or ran last, kept up to date while the calling component is shown. */
 export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<void> } {
@@ -23,6 +24,7 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
   useEffect(() => {
     if (!connected) return;
     let shown = true;
+    endPolling(); // of a view that was left while the procedure ran
     const end = repeat(async () => {
       try {
         const value = await request<Job>("GET", "/procedure");
@@ -32,6 +34,7 @@ export function useJob(): { job: Job | null; start: (wanted: Wanted) => Promise<
       }
       if (!shown && !store.procedure) end();
     }, LOOK_MS);
+    endPolling = end;
     return () => {
       shown = false; // in another view, the right is given back when the procedure has ended
       if (!store.procedure) end();

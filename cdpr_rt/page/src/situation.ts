@@ -117,7 +117,8 @@ function faultOf(status: Status): Situation {
 function readyOf(status: Status): Situation {
   const { fallen, broken } = lastStop(status);
   const [, who] = /^disable by (.*)$/.exec(status.commanded ?? "") ?? [];
-  const words = [who ? `${who} has switched the power off` : status.reason];
+  const why = /right to move/.test(status.reason) ? "" : status.reason;
+  const words = [why, who && `${who} has switched the power off`];
   if (broken.length) words.push("Repair the cable before you enable");
   else if (fallen) words.push("The platform has come down: look at it before you enable");
   return situation("ready", "No power", words.filter(Boolean).join(". ") || "The drives are ready. Keep clear of the robot", "enable");

@@ -57,14 +57,17 @@ def test_a_slack_cable_is_paid_out_against_friction_up_to_the_push(friction_N: f
         assert speed_rad_s == 0.0 and loop.tension_N[0] >= 0.0
 
 
-def test_a_motor_whose_encoder_shows_no_motion_does_not_run_away() -> None:
+@pytest.mark.parametrize("left_m", [0.0, 2.0])
+def test_a_motor_whose_encoder_shows_no_motion_does_not_run_away(left_m: float) -> None:
     """The cable is slack; the motor turns, and its encoder does not count."""
     loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
     loop.high_N[:], loop.paying_out_m_s[:] = HIGH_N, 0.15
-    loop.left_m[:], loop.push_N[:] = 2.0, 25.0
-    loop.integral_rate_1_s = HANGING_LOAD_1_s
+    loop.left_m[:] = left_m
+    loop.push_N[:], loop.low_N[:] = (25.0, 0.0) if left_m else (0.0, -25.0)
+    if left_m:  # as in a blind lowering; otherwise as in tightening
+        loop.integral_rate_1_s = HANGING_LOAD_1_s
     feedback, torque_Nm, speed_rad_s, fastest_rad_s = AxisFeedback(1), np.zeros(1), 0.0, 0.0
-    loop.begin(feedback, np.zeros(1), torque_Nm)
+    loop.begin(feedback, np.full(1, -1.0), torque_Nm)  # it was reeling in when the encoder failed
     for _ in range(1000):
         moving_Nm = max(torque_Nm[0] - COULOMB_Nm, -COULOMB_Nm)
         speed_rad_s = max(speed_rad_s + PERIOD_s * moving_Nm / INERTIA_kg_m2, 0.0)
@@ -91,3 +94,20 @@ def test_a_winch_whose_encoder_shows_noise_does_not_wind_in_its_cable(noise_coun
         tensions_N.append(loop.tension_N[0])
     assert loop.noisy[0] == (noise_counts > 100.0)
     assert np.mean(tensions_N[200:]) == 0.0 if loop.noisy[0] else min(tensions_N) >= LOW_N
+
+
+def test_a_winch_that_turns_slowly_under_the_full_push_is_not_stuck() -> None:
+    """A winch with a gear needs more time to reach its speed than an encoder to show a motion."""
+    inertia, push_N = 20.0 * INERTIA_kg_m2, 10.0
+    loop = WinchSpeedLoop(np.array([inertia]), np.array([CABLE_m]), PERIOD_s)
+    loop.high_N[:], loop.paying_out_m_s[:] = HIGH_N, 0.15
+    loop.left_m[:], loop.push_N[:] = 0.1, push_N
+    feedback, torque_Nm, speed_rad_s = AxisFeedback(1), np.zeros(1), 0.0
+    loop.begin(feedback, np.zeros(1), torque_Nm)
+    for _ in range(2000):
+        friction_Nm = 0.5 * push_N * CABLE_m
+        speed_rad_s = max(speed_rad_s + PERIOD_s * (torque_Nm[0] - friction_Nm) / inertia, 0.0)
+        feedback.position_rad += PERIOD_s * speed_rad_s
+        loop.update(feedback, torque_Nm)
+    assert not loop.stuck.any()
+    assert CABLE_m * feedback.position_rad[0] > 0.09

@@ -300,8 +300,14 @@ def test_a_program_for_five_axes_is_rejected_and_one_rotary_axis_is_noted():
         read("G0 X0 Y0 Z0 A5", "X10", "A0 B5", "M2")
     path = read("G0 X0 Y0 Z0", "A5", "A0", "B5", "M2")
     assert path.notices == [
-        "A B: turns the platform from home, about X, Y or Z of the room; it is not a rotary table"
+        "A B: turns the platform from home, about X, Y or Z of the file; it is not a rotary table"
     ]
+
+
+def test_a_rotation_given_in_the_room_is_one_rotation_also_in_a_turned_file():
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    path = read("G0 X0 Y0 Z0", "G53 G0 A5", "M2", placement=turn)
+    np.testing.assert_allclose(path.moves[-1].end[3:], [math.radians(5.0), 0, 0], atol=1e-12)
 
 
 def test_a_rejected_arc_names_the_other_kind_of_centre_if_that_fits():

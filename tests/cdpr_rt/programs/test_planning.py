@@ -47,7 +47,7 @@ def test_tensions_along_a_planned_path_stay_within_their_bounds(planner):
     ("lines", "line", "told"),
     [
         (["G0 X0 Y0 Z0", "X100", "X900"], 3, "x .* is outside; allowed: -500 to 200 mm"),
-        (["G0 X0 Y0 Z0", "A10", "B14"], 3, "turned by .* deg from .*; allowed: up to 15 deg"),
+        (["G0 X0 Y0 Z0", "A10", "A16"], 3, "turned by .* deg from .*; allowed: up to 15 deg"),
     ],
 )
 def test_the_first_place_outside_is_named(planner, lines, line, told):

@@ -389,6 +389,22 @@ def test_a_winch_that_does_not_turn_is_reported_and_the_platform_counts_as_falle
     assert robot.parts.last_stop.fallen
 
 
+@pytest.mark.parametrize(
+    ("noise_rad", "text"), [(0.0, "its encoder shows no motion"), (0.2, "mostly noise")]
+)
+def test_tighten_names_a_winch_whose_encoder_has_failed(noise_rad: float, text: str) -> None:
+    robot = Standing()
+    robot.switch("tighten")
+    held_rad, sign = robot.angle[2], 1.0
+    for _ in range(20_000):
+        robot.run(PERIOD_S)
+        robot.angle[2], robot.speed[2], sign = held_rad + sign * noise_rad, 0.0, -sign
+        if robot.program.progress()["trouble"]:
+            break
+    assert robot.program.progress()["trouble"].startswith("lower: ")
+    assert text in robot.program.progress()["trouble"]
+
+
 def test_the_index_path_turns_every_motor_by_a_whole_turn():
     platform = ROBOT.platform
     assert platform is not None

@@ -244,15 +244,18 @@ def test_a_loop_that_does_not_answer_is_reported(rig: Rig) -> None:
     assert "has not answered 'hold' within 3 s" in answer.json()["error"]
 
 
-def test_a_loop_that_does_not_turn_gets_no_commands(rig: Rig) -> None:
+def test_a_loop_that_does_not_turn_gets_stops_only(rig: Rig) -> None:
     rig.loop.stand_still()
     rig.block.counters["loop_alive_ns"] -= 6_000_000_000
+    stops = rig.block.stops
     with rig.client() as client:
         assert client.get("/status").json()["loop"]["silent_s"] > 5.0
         answer = client.post("/hold")
     assert answer.status_code == 503
     assert "has run no cycle" in answer.json()["error"]
     assert rig.block.take_command() is None
+    assert rig.block.stops == stops + 1  # cancels what it would carry out if it continued
+    assert rig.block.take_urgent() is not None
 
 
 def test_a_dead_loop_is_reported_also_to_waiting_clients(own_rig: Rig) -> None:

@@ -105,11 +105,15 @@ def test_a_viewer_may_stop_the_robot_on_its_connection(rig: Rig) -> None:
     with connect(f"ws://127.0.0.1:{rig.port}/live") as viewer:
         for text in ("", "{", '{"do": "enable"}', '{"do": "shutdown"}', '{"do": "program"}'):
             viewer.send(text)
+        viewer.send(json.dumps({"do": "hold", "client": "\n", "id": "x"}))  # obeyed all the same
         viewer.send(json.dumps({"do": "disable", "client": "jan", "id": 4}))
         messages = (json.loads(viewer.recv(60.0)) for _ in range(1000))
-        answer = next(one for one in messages if one["kind"] == "reply")
-    assert answer == {"kind": "reply", "id": 4, "ok": True, "error": None}
-    assert [(one["do"], one["client"]) for one in rig.loop.commands] == [("disable", "jan")]
+        answers = [one for one in messages if one["kind"] in ("taken", "reply")][:4]
+    assert [one["id"] for one in answers] == [None, None, 4, 4]
+    assert answers[2] == {"kind": "taken", "id": 4}
+    assert answers[3] == {"kind": "reply", "id": 4, "ok": True, "error": None}
+    done = [(one["do"], one["client"]) for one in rig.loop.commands]
+    assert done == [("hold", "somebody"), ("disable", "jan")]
 
 
 @pytest.mark.parametrize("query", ["rate_Hz=51", "rate_Hz=0", "rate_Hz=nan", "rate_Hz=x"])

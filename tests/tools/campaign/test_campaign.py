@@ -177,9 +177,10 @@ def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
 
 
 @pytest.mark.long
-def test_fixed_seeds_violate_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fixed_seeds_violate_nothing() -> None:
     """They draw almost every fault and command, for the robot as it is shipped."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", "/nonexistent")
-    seeds = ("--from", "60", "--seeds", "60", "--workers", "1")
-    done = cdpr_here("sim", "campaign", ROBOT, *seeds, "--json")
+    words = ("sim", "campaign", ROBOT, "--from", "60", "--seeds", "60", "--workers", "1", "--json")
+    environment = {**os.environ, "XDG_CONFIG_HOME": "/nonexistent"}
+    command = module_command("cdpr_tools.cli", *words)  # its own process, with its own robots
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 0, done.stdout

@@ -92,7 +92,7 @@ def test_a_command_during_a_reaction_is_rejected_with_its_reason(rig: LoopRig) -
     rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
     answer = rig.command("hold")
     assert not answer["ok"]
-    assert "the robot is stopping (axis 1: slack), " in answer["text"]
+    assert "the robot is stopping (axis 1: slack): " in answer["text"]
 
 
 def test_a_program_whose_progress_fails_continues(rig: LoopRig) -> None:

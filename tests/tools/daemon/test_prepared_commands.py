@@ -129,7 +129,7 @@ def test_losing_the_right_to_move_cancels_a_preparation(rig: LoopRig) -> None:
     number = begun_in_a_jog(rig, "without a right")
     rig.drop_right()
     rig.take_right()
-    why = "jog: another client has taken the right to move; held"
+    why = "jog: another client has taken the right to move; the robot holds"
     assert answer_to(rig, number) == f"cancelled: {why}"
     assert (rig.loop.engine.program.name, rig.status["reason"]) == ("hold", why)
 

@@ -62,7 +62,9 @@ def test_motion_ends_when_the_right_changes_hands_between_two_checks(rig: LoopRi
     assert np.all(np.diff(rows["setpoint_velocity_rad_s"], axis=0) <= 0.0)
     assert np.all(rows["setpoint_velocity_rad_s"][-1] == 0.0)
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
-    assert rig.status["reason"] == "jog: another client has taken the right to move; held"
+    assert (
+        rig.status["reason"] == "jog: another client has taken the right to move; the robot holds"
+    )
     for do in ("program", "set"):
         answer = rig.command(do, program="jog", wanted=JOG, right=before)
         assert answer["text"] == f"{do}: another client has the right to move now"
@@ -80,7 +82,7 @@ def test_enabling_under_a_lost_right_ends_with_a_hold(rig: LoopRig) -> None:
     answer = rig.block.take_reply()
     assert answer is not None
     assert (answer["to"], answer["ok"]) == (number, False)
-    assert answer["text"] == "jog: another client has the right to move now; held"
+    assert answer["text"] == "jog: another client has the right to move now; the robot holds"
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
     # cogging moves an axis without power: hold brakes that motion and adds none
     speeds = np.abs(rig.run(0.2)["setpoint_velocity_rad_s"])

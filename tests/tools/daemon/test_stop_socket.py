@@ -8,6 +8,7 @@ import socket
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,19 @@ def test_a_command_requested_before_a_stop_and_posted_after_it_does_not_move(
     refused = jogging.command("program", **JOG, stops=before)
     assert refused["text"] == "program: cancelled by a later stop"
     assert jogging.loop.engine.program.name == "hold"
+
+
+def test_a_stop_while_enable_checks_its_files_leaves_the_power_off(
+    loop: LoopRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if loop.state is LoopState.ACTIVE:
+        loop.obeyed("disable")
+    engine = loop.loop.engine
+    parts = replace(engine.parts, before_power=loop.block.count_stop)
+    monkeypatch.setattr(engine, "parts", parts)
+    assert loop.command("enable")["text"] == "enable: cancelled by a later stop"
+    loop.turn_until(lambda: not loop.loop.busy)
+    assert loop.state is LoopState.READY
 
 
 def test_disable_is_answered_when_power_is_off_and_is_idempotent(

@@ -69,7 +69,9 @@ class Clients:
         self.rig = rig
         self.link = LoopLink(rig.block)
         rig.block.counters["loop_pid"] = 0  # alive like this process
-        self.link._require_loop = lambda: None  # type: ignore[method-assign]  # turned by the test
+        # turned by the test
+        self.link._require_loop = lambda: None  # type: ignore[method-assign]
+        self.link._require_cycles = lambda: None  # type: ignore[method-assign]
         self.asked: list[tuple[str, asyncio.Task[Reply]]] = []
 
     async def ask(self, do: str) -> None:

@@ -98,8 +98,8 @@ def test_a_vicon_export_has_columns_by_body_and_time_from_frames(tmp_path: Path)
 
 QUALISYS = (
     "NO_OF_FRAMES\t2\nFREQUENCY\t100\nTIME_STAMP\t2023-05-04, 10:11:12.345\t1234.5\n"
-    "BODY_NAMES\tPlatform\tWand\nFrame\tTime\tPlatform X\tY\tZ\tRoll\tWand X\tY\tZ\tRoll\n"
-    "1\t0.00\t1\t2\t3\t0.5\t7\t8\t9\t0.1\n2\t0.01\t1.5\t2\t3\t0.5\t\t\t\t\n"
+    "BODY_NAMES\tPlatform\tWand\nFrame\tTime\tPlatform X\tY\tZ\tRoll\tWand X\tY\tZ\tRoll\t\n"
+    "1\t0.00\t1\t2\t3\t0.5\t7\t8\t9\t0.1\n2\t0.01\t1.5\t2\t3\t0.5\t0.000\t0.000\t0.000\t0\n"
 )
 
 
@@ -107,7 +107,9 @@ def test_a_qualisys_export_has_columns_by_body_in_mm(tmp_path: Path) -> None:
     table = read_table(written(tmp_path, QUALISYS))
     assert table.column("time_s") == pytest.approx([0.0, 0.01])
     assert table.column("Platform X") == pytest.approx([1.0, 1.5])
-    assert table.column("Wand Z")[0] == 9.0
+    assert table.column("Wand Z") == pytest.approx([9.0, np.nan], nan_ok=True)  # then hidden
+    with pytest.raises(ProfileError, match="Platform Roll: is an Euler angle"):
+        table.column("Platform Roll")
     assert table.units["Platform X"] == "mm"
     with pytest.raises(ProfileError, match=r"line 5: no line of names with `Time`"):
         read_table(written(tmp_path, QUALISYS.replace("Frame\tTime", "Frame\tt")))
