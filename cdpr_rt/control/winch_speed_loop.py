@@ -147,7 +147,7 @@ class WinchSpeedLoop:
         self.speed_rad_s = np.zeros(n)
         """Filtered motor speed."""
         self.stuck = np.zeros(n, np.bool_)
-        """Whether each winch was pushed outwards fully and has not turned."""
+        """Whether each winch was pushed outwards fully and has not turned for that time."""
         self._unseen_s = np.zeros(n)
         self._noise_m_s = np.zeros(n)
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)

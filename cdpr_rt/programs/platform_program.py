@@ -159,8 +159,8 @@ class PlatformParts:
         self.not_calibrated_reason = ""
         """Reason why the geometry is unreliable, for example that a rail has moved; else empty."""
         self.off_home = ""
-        """Text that says how far the platform may stand from the pose that its lengths give, which
-        were taken at home."""
+        """Text that says how far the platform may stand from the pose that its lengths give. The
+        lengths were taken at home."""
         self.off_home_by = np.zeros(model.size)
         """Difference (d,) of the pose from home if the lengths were taken at home; 0 if it is not
         the reason for `off_home`."""

@@ -449,7 +449,7 @@ class SlackTakeUp:
         enter(first, self._phase, self._state, position_rad)
 
     def update(self, position_rad: FloatArray, pretension_N: FloatArray, share: float) -> bool:
-        """Raise the winches' bounds of tension and set speeds, (n,); return whether it continues.
+        """Raise the winches' bounds of tension and set speeds, (n,); return whether it advanced.
 
         Cables that are reeled in pull with a share of their allowed tension, which grows to 1. They
         pull harder only if the bounds already allow it.
