@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any, Final
 
 from cdpr_rt.robot import Error
@@ -72,6 +73,7 @@ class _Server:
         return [_result(one) for one in json.loads(line)]
 
 
+_LATER_S: Final = 0.01
 _servers: list[_Server] = []
 
 
@@ -99,7 +101,12 @@ def _serve() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def _interrupt_once(*_: object) -> None:
+def _interrupt_once(_: int, frame: FrameType | None) -> None:
+    while frame is not None:
+        if frame.f_code.co_name == "__del__":  # an exception there would be lost
+            signal.setitimer(signal.ITIMER_REAL, _LATER_S)
+            return
+        frame = frame.f_back
     for number in (signal.SIGTERM, signal.SIGINT):  # a second one would interrupt the end
         signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
@@ -107,7 +114,7 @@ def _interrupt_once(*_: object) -> None:
 
 def _end_with(parent: int) -> None:
     """End when the parent ends, as after an interrupt, so that temporary files are removed."""
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGALRM):
         signal.signal(number, _interrupt_once)
     end_with_launcher(parent)
 

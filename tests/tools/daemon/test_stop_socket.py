@@ -154,7 +154,7 @@ def test_invalid_datagrams_are_ignored_without_leaking_descriptors(
     send(socket_path, data, 0, 0, 0)
     jogging.turn(5)
     assert jogging.loop.engine.program.name == "jog"
-    assert descriptors() == before
+    assert descriptors() <= before  # others of this process may have been closed
     with asking(socket_path, "hold") as answer:
         jogging.turn_until(answer.done)
     assert answer.result()["ok"]
