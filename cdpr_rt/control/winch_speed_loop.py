@@ -35,9 +35,10 @@ which a winch that does not turn is pushed fully, plus cycles until its encoder 
 A rotor whose encoder has failed accelerates unseen, so they are short."""
 _FULL_SHARE, _TURNS_SHARE = 0.95, 0.1
 """Share of the highest push that counts as full, and of the commanded speed that shows a motion."""
-_NOISY_m_s, _NOISE_S = 1.0, 0.05
-"""Mean deviation of a cable's measured speed from its filtered value, over this time, above which
-an encoder is not used: its noise would be clipped to an average pull, which drags the platform."""
+_NOISY_m_s, _NOISE_S = 0.5, 0.05
+"""Noise of a cable's measured speed, averaged over this time, above which an encoder is not used:
+its noise would be clipped to an average pull, which drags the platform. Noise is a deviation from
+the filtered speed that changes its sign; that of an acceleration keeps it."""
 
 
 @jit
@@ -53,6 +54,7 @@ def control_speed(
     unseen: FloatArray,
     stuck: BoolArray,
     noise: FloatArray,
+    deviation: FloatArray,
     push: FloatArray,
     position: FloatArray,
     last: FloatArray,
@@ -73,9 +75,11 @@ def control_speed(
         if not fast or jumped[i]:
             speed[i] += weight * (raw - speed[i])
         jumped[i] = fast
-        off = min(abs(cable[i] * (raw - speed[i])), _FASTEST_m_s)
+        off = min(max(cable[i] * (raw - speed[i]), -_FASTEST_m_s), _FASTEST_m_s)
+        swing = min(abs(off), abs(deviation[i])) if off * deviation[i] < 0.0 else 0.0
+        deviation[i] = off
         if noise[i] <= _NOISY_m_s:
-            noise[i] += period / (period + _NOISE_S) * (off - noise[i])
+            noise[i] += period / (period + _NOISE_S) * (swing - noise[i])
         out = cable[i] * speed[i]
         rate = integral_rate
         if left[i] > 0.0:
@@ -149,7 +153,7 @@ class WinchSpeedLoop:
         self.stuck = np.zeros(n, np.bool_)
         """Whether each winch was pushed outwards fully and has not turned for that time."""
         self._unseen_s = np.zeros(n)
-        self._noise_m_s = np.zeros(n)
+        self._noise_m_s, self._deviation_m_s = np.zeros((2, n))
         self._last, self._jumped = np.zeros(n), np.zeros(n, np.bool_)
         self._integral = np.zeros(n)
         self._kernel = bound_to(self._bind)
@@ -157,7 +161,7 @@ class WinchSpeedLoop:
     def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
         """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
         self._last[:], self._jumped[:] = feedback.position_rad, False
-        self._unseen_s[:] = self._noise_m_s[:] = 0.0
+        self._unseen_s[:] = self._noise_m_s[:] = self._deviation_m_s[:] = 0.0
         self.stuck[:] = False
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
@@ -178,6 +182,7 @@ class WinchSpeedLoop:
         return bound(
             control_speed, self._period_s, self._weight, self.low_N, self.high_N,
             self.paying_out_m_s, self._cable, self._gain, self.left_m, self._unseen_s, self.stuck,
-            self._noise_m_s, self.push_N, feedback.position_rad, self._last, self._jumped,
-            self.speed_rad_s, self._integral, self.tension_N, torque_Nm, then=(0.0, 0.0),
+            self._noise_m_s, self._deviation_m_s, self.push_N, feedback.position_rad, self._last,
+            self._jumped, self.speed_rad_s, self._integral, self.tension_N, torque_Nm,
+            then=(0.0, 0.0),
         )  # fmt: skip

@@ -121,7 +121,8 @@ def fall(
     jumped = np.zeros(n, np.bool_)
     out, as_cable, scratch = np.full(n, c.paying_out_m_s), np.ones(n), np.zeros((4, 6, 6))
     left, low = winches["left_m"].copy(), winches["low_N"].copy()
-    unseen, stuck, noise = np.zeros(n), np.zeros(n, np.bool_), np.zeros(n)
+    unseen, stuck = np.zeros(n), np.zeros(n, np.bool_)
+    noise, deviation = np.zeros(n), np.zeros(n)
     run_cables(geometry, pose, cables)
     for i in range(n):
         middle_N = pull[i] - tension_rise(geometry, cables, i)
@@ -135,8 +136,8 @@ def fall(
         if cycle >= c.held_cycles:
             control_speed(
                 c.period_s, weight, low, winches["high_N"], out, as_cable, winches["gain_N_s_m"],
-                left, unseen, stuck, noise, winches["push_N"], length, last, jumped, speed,
-                integral, pull, torque, c.fastest_in_m_s, c.integral_rate_1_s,
+                left, unseen, stuck, noise, deviation, winches["push_N"], length, last, jumped,
+                speed, integral, pull, torque, c.fastest_in_m_s, c.integral_rate_1_s,
             )  # fmt: skip
         if c.dead >= 0:
             pull[c.dead] = 0.0

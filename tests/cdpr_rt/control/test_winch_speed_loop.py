@@ -96,6 +96,20 @@ def test_a_winch_whose_encoder_shows_noise_does_not_wind_in_its_cable(noise_coun
     assert np.mean(tensions_N[200:]) == 0.0 if loop.noisy[0] else min(tensions_N) >= LOW_N
 
 
+def test_a_winch_that_accelerates_as_fast_as_its_motor_can_does_not_count_as_noise() -> None:
+    """Its cable has broken under the highest tension."""
+    loop = WinchSpeedLoop(np.array([INERTIA_kg_m2]), np.array([CABLE_m]), PERIOD_s)
+    loop.low_N[:], loop.high_N[:], loop.paying_out_m_s[:] = LOW_N, HIGH_N, 0.15
+    loop.fastest_in_m_s, loop.integral_rate_1_s = FASTEST_IN_m_s, HANGING_LOAD_1_s
+    feedback, torque_Nm, speed_rad_s = AxisFeedback(1), np.zeros(1), 0.0
+    loop.begin(feedback, np.zeros(1), np.zeros(1))
+    for _ in range(40):
+        speed_rad_s -= PERIOD_s * HIGH_N * CABLE_m / INERTIA_kg_m2
+        feedback.position_rad += PERIOD_s * speed_rad_s
+        loop.update(feedback, torque_Nm)
+        assert not loop.noisy.any()
+
+
 def test_a_winch_that_turns_slowly_under_the_full_push_is_not_stuck() -> None:
     """A winch with a gear needs more time to reach its speed than an encoder to show a motion."""
     inertia, push_N = 20.0 * INERTIA_kg_m2, 10.0

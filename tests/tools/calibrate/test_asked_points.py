@@ -70,7 +70,9 @@ def test_typed_measurements_are_stored_as_points(
     assert [point.std_m for point in points] == [0.002, 0.0003, 0.002]
     said = capsys.readouterr().err.splitlines()
     assert sum("allowed: x y z" in line for line in said) == 4
-    assert "pose 5" in said[-1]  # after the end of input there are no questions
+    assert said[-1].startswith(
+        "the platform stands at pose 5"
+    )  # after the end of input there are no questions
 
 
 def test_a_point_far_from_the_pose_by_cables_is_asked_again(
