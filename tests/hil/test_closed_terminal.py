@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from daemon_rig import PATIENCE_S, cdpr, write_robot
+from daemon_rig import PATIENCE_S, cdpr
 
 from cdpr_profiles.places import SHIPPED
 from cdpr_tools.composition.simulator import OwnSimulator
@@ -45,21 +45,6 @@ def on_terminal(*words: str) -> tuple[subprocess.Popen[bytes], int]:
         process.wait()
         raise
     return process, ours
-
-
-def test_a_daemon_whose_terminal_closes_ends_with_status_0(tmp_path: Path) -> None:
-    at = ("--socket", str(tmp_path / "control.sock"))
-    robot = str(write_robot(tmp_path))
-    process, terminal = on_terminal(robot, "--bus", "simbus:", "--no-record", *at)
-    try:
-        done = cdpr("enable", *at)
-        assert done.returncode == 0, done.stderr
-        os.close(terminal)
-        assert process.wait(PATIENCE_S) == 0
-    finally:
-        process.kill()
-        process.wait()
-    assert not list(tmp_path.glob("control.*"))
 
 
 def test_a_closed_terminal_lowers_a_platform_for_more_than_half_a_minute(

@@ -184,22 +184,11 @@ def test_a_missing_node_is_reported(lab: Lab, tmp_path: Path) -> None:
     assert "power, wiring" in told
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "letter", "found"),
-    [
-        ("vendor_id", "0x00000ABC", "D", "00CD9A01h"),
-        ("product_code", "0x00000403", "M", "00000402h"),
-        ("revision", "0x00020000", "N", "00010000h"),
-    ],
-)
-def test_a_drive_with_a_wrong_identity_is_reported(
-    lab: Lab, tmp_path: Path, key: str, value: str, letter: str, found: str
-) -> None:
-    winch = own_profiles(tmp_path, {}, {key: value})
+def test_a_drive_with_a_wrong_identity_is_reported(lab: Lab, tmp_path: Path) -> None:
+    winch = own_profiles(tmp_path, {}, {"product_code": "0x00000403"})
     told = fails("drive", "home", winch, "--bus", lab.bus)
-    assert f"step {letter}" in told
-    assert found in told
-    assert f"{int(value, 16):08X}h" in told
+    assert "step M" in told
+    assert "00000402h" in told and "00000403h" in told
     assert lab.state() == OFF
 
 

@@ -1,4 +1,4 @@
-"""One daemon per robot, and daemons whose terminal, reader, launcher or service fails."""
+"""Daemons whose terminal, reader, launcher or service fails."""
 
 from __future__ import annotations
 
@@ -13,44 +13,9 @@ from pathlib import Path
 
 import pytest
 from daemon_lab import KEY, with_key
-from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until, write_robot
+from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until
 
 from cdpr_tools.bench.flood import Target
-from cdpr_tools.daemon.loop_file import LoopFile
-
-RUN = [sys.executable, "-P", "-m", "cdpr_tools.cli", "run"]
-
-
-def test_only_one_of_two_simultaneously_started_daemons_runs_and_estop_reaches_it(
-    tmp_path: Path,
-) -> None:
-    at = ("--socket", str(tmp_path / "control.sock"))
-    command = [*RUN, str(write_robot(tmp_path)), "--bus", "simbus:", "--no-record", *at]
-    both = [
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    try:
-        until(lambda: any(one.poll() is not None for one in both), PATIENCE_S)
-        refused, running = sorted(both, key=lambda one: one.poll() is None)
-        told, why = refused.communicate(timeout=PATIENCE_S)
-        assert (refused.returncode, told) == (2, "")
-        assert f"a daemon already runs there, process {running.pid}; `cdpr stop`" in why
-        assert running.stdout is not None
-        assert json.loads(running.stdout.readline())["ready"]["pid"] == running.pid
-        assert cdpr("enable", *at).returncode == 0
-        loop = LoopFile.read(tmp_path / "control.loop").pid
-        assert Path(f"/proc/{loop}/stat").read_text().split()[3] == str(running.pid)
-        done = cdpr("estop", *at)
-        assert (done.returncode, "every drive confirms it" in done.stdout) == (0, True)
-        assert '"state": "fault"' in cdpr("status", "--json", *at).stdout
-        running.terminate()
-        assert running.wait(PATIENCE_S) == 0
-    finally:
-        for one in both:
-            one.kill()
-            one.communicate()
-    assert not list(tmp_path.glob("control.*"))
 
 
 def test_a_daemon_whose_output_is_closed_restarts_its_service(

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -25,7 +23,6 @@ from daemon_lab import (
     happened,
     holding,
     running,
-    setpoints,
     with_key,
     with_power,
 )
@@ -270,61 +267,3 @@ def test_a_restarted_service_does_not_need_the_key_file(daemon: RealDaemon, url:
     finally:
         key_file.touch(mode=0o600)
         key_file.write_text(text)
-
-
-def flood(url: str, ended: threading.Event, what: bytes) -> None:
-    host, _, port = url.removeprefix("http://").partition(":")
-    while not ended.is_set():
-        with suppress(OSError), socket.create_connection((host, int(port)), 1.0) as sock:
-            sock.settimeout(0.2)
-            for _ in range(200):
-                if ended.is_set():
-                    break
-                sock.sendall(what)
-                sock.recv(1)
-
-
-def test_a_flood_from_the_holders_address_neither_moves_nor_blocks_it(
-    active: RealDaemon, url: str
-) -> None:
-    service = active.children()["service"]
-    before = setpoints(active)
-    key = RIGHT["Authorization"].encode()
-    floods = [
-        b"\x00\xff" * 5000,
-        b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n" * 20,
-        b"POST /program HTTP/1.1\r\nHost: localhost\r\nAuthorization: "
-        + key
-        + b"\r\nContent-Length: 2\r\n\r\n{}",
-        b"POST /hold HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n{",
-        b"GET /live HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
-        b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-        b"Authorization: " + key + b"\r\n\r\n",
-    ]
-    ended = threading.Event()
-    threads = [
-        threading.Thread(target=flood, args=(url, ended, what)) for what in floods for _ in range(2)
-    ]
-    with holding(active) as headers, httpx.Client(base_url=url, timeout=60.0) as client:
-        shown = {**RIGHT, **headers}
-        assert client.put("/control", headers=shown).status_code == 200
-        taken_B = [resident_B(service)]
-        for thread in threads:
-            thread.start()
-        try:
-            # the memory of connections and buffers levels off
-            while taken_B[-1] - taken_B[0] < MOST_MEMORY_B:
-                for _ in range(10):
-                    assert client.put("/control", headers=shown).status_code == 200
-                    time.sleep(0.2)
-                taken_B.append(resident_B(service))
-                if len(taken_B) > 2 and taken_B[-1] - taken_B[-2] < LEVEL_B:
-                    break
-        finally:
-            ended.set()
-            for thread in threads:
-                thread.join()
-    assert active.status()["program"] == "hold", happened(active)
-    assert setpoints(active) == pytest.approx(before, abs=0.01)
-    assert taken_B[-1] - taken_B[-2] < LEVEL_B, taken_B
-    assert taken_B[-1] - taken_B[0] < MOST_MEMORY_B, taken_B

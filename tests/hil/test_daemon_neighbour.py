@@ -6,7 +6,6 @@ available: then owner and permissions of files are checked instead.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -23,7 +22,6 @@ from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_stream import port_of
 
 from cdpr_rt.loop.stop_socket import send_stop
-from cdpr_rt.service.stream_packet import StreamSetpoint
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
 
 NOBODY = 65534
@@ -119,37 +117,6 @@ def test_other_users_can_neither_signal_nor_inspect_the_daemons_processes(
     shared = Path(f"/proc/{loop.pid}/fd/{loop.block_fd}")
     assert is_denied(shared.parent, lambda: os.open(shared, os.O_RDONLY))
     assert daemon.status()["state"] == "ready"
-
-
-def test_a_user_without_the_key_can_only_read_the_status(daemon: RealDaemon) -> None:
-    url = f"http://{daemon.status()['parts']['service']['http']}"
-
-    def ask() -> object:
-        with httpx.Client(base_url=url) as client:
-            asked = [("POST", path) for path in ("/control", "/stream", "/enable", "/disable")]
-            asked += [("GET", "/status"), ("GET", "/events"), ("GET", "/description")]
-            return [client.request(*one).status_code for one in asked]
-
-    assert json.loads(as_nobody(ask)) == [401, 401, 401, 401, 200, 401, 401]
-
-
-def test_set_points_without_key_or_session_are_counted_but_not_answered(
-    daemon: RealDaemon,
-) -> None:
-    port = port_of(daemon)
-
-    def send() -> object:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-            sock.connect(("127.0.0.1", port))
-            for k in range(30):
-                sock.send(StreamSetpoint(9, k, k, (0.01 * k, 0.0, 0.0)).pack())
-                time.sleep(0.01)
-            sock.settimeout(0.3)
-            return sock.recv(4096)
-
-    assert as_nobody(send) == "TimeoutError"
-    until(lambda: daemon.status()["parts"]["stream"]["packets"]["unsigned"] == 30)
-    assert not daemon.status()["control"]["held"]
 
 
 def http_port_of(daemon: RealDaemon) -> int:

@@ -6,28 +6,22 @@ package, and python-can's command-line tools as listeners and players on a simul
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import pty
-import queue
 import struct
 import subprocess
 import sys
-import termios
 import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 
 import can
 import canopen
 import pytest
-from canopen.profiles.p402 import BaseNode402
 from tolerant_drive import NAME as TOLERANT
 from tolerant_drive import write_tolerant_drive
 
@@ -39,7 +33,6 @@ WINCH = "winch-mpp0923d"
 PROFILE = load_winch(WINCH)
 EDS = str(PROFILE.drive.eds)
 LONGEST_S = 60.0
-MARK = can.Message(arbitration_id=0x7FF, is_extended_id=False)
 
 
 @pytest.fixture(autouse=True)
@@ -238,89 +231,6 @@ def drives() -> Iterator[str]:
         yield name
 
 
-def test_a_third_party_lss_master_configures_new_drives_one_by_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The master reads silence as a bit. A drive that waits for a core would be silent too."""
-    passed = threading.Event()
-
-    class Answers(queue.Queue[bytes]):
-        """Wait until the bus has processed the request, instead of for a time."""
-
-        def get(self, block: bool = True, timeout: float | None = None) -> bytes:
-            passed.clear()
-            network.send_message(
-                MARK.arbitration_id, b""
-            )  # sent after the request on the same connection
-            assert other.recv(LONGEST_S) is not None  # all answers have been sent by now
-            other.send(MARK)
-            assert passed.wait(LONGEST_S)
-            return super().get(block=False)
-
-    monkeypatch.setattr(canopen.lss, "queue", SimpleNamespace(Queue=Answers, Empty=queue.Empty))
-    monkeypatch.setattr(canopen.lss, "time", SimpleNamespace(sleep=lambda _seconds: None))
-    with (
-        simulator("--nodes", "2", "--unconfigured") as name,
-        third_party_on(name) as network,
-        can.Bus(name, "simbus", can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}]) as other,
-    ):
-        network.subscribe(MARK.arbitration_id, lambda *_: passed.set())
-        lss = network.lss
-        serials = set()
-        for node_id in (10, 11):
-            found, numbers = lss.fast_scan()
-            assert found
-            assert numbers[:3] == [0x00CD9A01, 0x402, 0x10000]
-            serials.add(numbers[3])
-            assert [lss.inquire_lss_address(cs) for cs in range(0x5A, 0x5E)] == numbers
-            lss.configure_node_id(node_id)
-            lss.store_configuration()
-            lss.send_switch_state_global(lss.WAITING_STATE)
-        assert serials == {1, 2}
-        assert lss.fast_scan() == (False, None)
-        network.scanner.search()
-        assert wait_for(lambda: sorted(network.scanner.nodes) == [10, 11])
-
-
-def test_a_third_party_master_receives_emergencies_of_the_right_node(drives: str) -> None:
-    with third_party_on(drives) as network:
-        nodes = [network.add_node(BaseNode402(node_id, EDS)) for node_id in (1, 2)]
-        codes: dict[int, list[int]] = {1: [], 2: []}
-        for node in nodes:
-            node.emcy.add_callback(lambda error, n=node.id: codes[n].append(error.code))
-        nodes[1].sdo[0x2F00][1].raw = 0xFF02
-        assert wait_for(lambda: codes == {1: [], 2: [0xFF02]})
-        assert nodes[1].sdo[0x1003][1].raw & 0xFFFF == 0xFF02
-        assert nodes[0].sdo[0x1003][0].raw == 0
-        nodes[1].sdo[0x6040].raw = 0x80
-        assert wait_for(lambda: codes[2] == [0xFF02, 0])
-        assert nodes[1].sdo[0x1001].raw == 0
-
-
-def test_a_third_party_master_transfers_blocks_with_two_drives_simultaneously(drives: str) -> None:
-    contents = {1: os.urandom(20_000), 2: os.urandom(777)}
-
-    def there_and_back(node: canopen.RemoteNode, content: bytes) -> None:
-        sizes = {"size": len(content)}
-        with node.sdo.open(0x2F10, 0, "wb", block_transfer=True, **sizes) as stream:
-            stream.write(content)
-        with node.sdo.open(0x2F10, 0, "rb", block_transfer=True) as stream:
-            got[node.id] = stream.read()
-
-    got: dict[int, bytes] = {}
-    with third_party_on(drives) as network:
-        nodes = [network.add_node(node_id, EDS) for node_id in (1, 2)]
-        threads = [
-            threading.Thread(target=there_and_back, args=(node, contents[node.id]))
-            for node in nodes
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert got == contents
-
-
 # -- python-can's tools
 
 
@@ -378,39 +288,3 @@ def test_python_cans_logger_records_and_its_player_repeats_a_session(
 
 def _ask(node: canopen.RemoteNode) -> int:
     return int(node.sdo[0x1001].raw)
-
-
-def test_python_cans_viewer_shows_the_bus(drives: str) -> None:
-    master, terminal = pty.openpty()
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
-    viewer = subprocess.Popen(
-        [sys.executable, "-m", "can.viewer", "-i", "simbus", "-c", drives],
-        stdin=terminal,
-        stdout=terminal,
-        stderr=terminal,
-        env=os.environ | {"TERM": "xterm"},
-        start_new_session=True,
-    )
-    os.close(terminal)
-    os.set_blocking(master, False)
-    screen = b""
-
-    def shows(text: bytes) -> bool:
-        nonlocal screen
-        with suppress(OSError):
-            screen += os.read(master, 65536)
-        return text in screen
-
-    try:
-        with third_party_on(drives) as network:
-            node = network.add_node(1, EDS)
-            assert wait_for(lambda: shows(b"Count"))
-            assert node.sdo[0x1000].raw == 0x20192
-            assert wait_for(lambda: shows(b"0x581")), screen
-        os.write(master, b"\x1b")
-        assert wait_for(lambda: shows(b"") and viewer.poll() is not None), screen
-        assert viewer.returncode == 0
-    finally:
-        viewer.kill()
-        viewer.wait()
-        os.close(master)

@@ -15,14 +15,9 @@ import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
-from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.canopen.lss import LssAddress, LssMaster
 from cdpr_profiles import load_drive
-from cdpr_rt.core.clock import PacedClock
 from cdpr_sim_bus.bus.client import LocalNode, raw_can_socket
 from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.canopen import CanopenSlave, ObjectDictionary, SlaveApplication
-from cdpr_sim_bus.canopen.lss import UNCONFIGURED
 from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.robot.plant import Plant
@@ -73,12 +68,6 @@ def third_party() -> Iterator[canopen.Network]:
         network.disconnect()
 
 
-def new_device(serial: int) -> CanopenSlave:
-    od = ObjectDictionary.from_eds(EDS, UNCONFIGURED)
-    od.set_default(0x1018, 4, serial)
-    return CanopenSlave(od, UNCONFIGURED, SlaveApplication())
-
-
 def identifiers(log: Path) -> set[int]:
     return {int(text, 16) for text in re.findall(r"ID: +([0-9a-f]+) ", log.read_text())}
 
@@ -120,19 +109,3 @@ def test_a_third_party_master_enables_a_drive_while_python_cans_logger_records(
     finally:
         logger.send_signal(2)
         logger.communicate(timeout=120)
-
-
-def test_new_devices_get_node_ids_by_lss() -> None:
-    serials = (0x0001FFFF, 0xFFFFFFF0)
-    wanted = [LssAddress(0x00CD9A01, 0x402, 0x10000, serial) for serial in serials]
-    with (
-        on_vcan(*(new_device(serial) for serial in serials)),
-        LssMaster(BusUrl.parse("socketcan:vcan0"), PacedClock(), 0.3) as master,
-    ):
-        assert master.unconfigured() == wanted
-        assert master.select(wanted[1]) == UNCONFIGURED
-        master.set_node_id(9)
-        master.release()
-        assert master.wait_for_boot_up(9, _LONGEST_S)
-        assert master.node_id_in_use(9) == "it answers SDO requests"
-        assert master.node_id_in_use(10, 0.1) == ""

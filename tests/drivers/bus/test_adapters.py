@@ -22,7 +22,7 @@ from cdpr_drivers.bus.frames import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
 from cdpr_drivers.bus.slcan import SlcanAdapter
 from cdpr_drivers.bus.socketcand import SocketcandAdapter
 from cdpr_drivers.errors import BusError
-from tests.drivers.bus.port_frames import frame, open_files, receive
+from tests.drivers.bus.port_frames import GREETING, Server, frame, open_files, receive
 
 
 def opened(url: BusUrl, filters: list[tuple[int, int]] | None = None) -> FramePort:
@@ -287,41 +287,6 @@ def test_a_serial_port_in_use_by_another_program_is_reported(start: Start) -> No
 
 
 # -- socketcand
-
-
-class Server:
-    """A socketcand server that sends the pieces of text that a test gives it."""
-
-    def __init__(self, *greeting: bytes) -> None:
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.heard = b""
-        self.client: socket.socket
-        self._greeting = greeting
-        self.serve()
-
-    def serve(self) -> None:
-        """Greet one client."""
-        self._thread = threading.Thread(target=self._greet, daemon=True)
-        self._thread.start()
-
-    @property
-    def url(self) -> BusUrl:
-        return BusUrl.parse(f"socketcand://127.0.0.1:{self.listener.getsockname()[1]}/can0")
-
-    def _greet(self) -> None:
-        self.client, _ = self.listener.accept()
-        for text in self._greeting:
-            self.client.sendall(text)
-            if text != self._greeting[-1]:
-                self.heard += self.client.recv(4096)
-
-    def close(self) -> None:
-        self.listener.close()
-        self._thread.join(60.0)
-        self.client.close()
-
-
-GREETING = (b"< hi >", b"< ok >", b"< ok >")
 
 
 def test_a_lost_server_can_be_reopened_before_the_old_port_is_closed() -> None:

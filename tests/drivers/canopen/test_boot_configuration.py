@@ -150,16 +150,6 @@ def test_a_different_configuration_is_downloaded_and_the_changes_reported(
     assert report.changed == ["1017h:0 = 200"]
 
 
-def test_a_limit_changed_by_hand_is_corrected_although_the_stamp_was_stored(
-    network: CanNetwork,
-) -> None:
-    _boot(network, store=True)
-    network.write(1, 0x6072, 0, 4000)
-    report = _boot(network)
-    assert report.changed == ["6072h:0 = 1000"]
-    assert network.read_int(1, 0x6072) == 1000
-
-
 def test_a_changed_limit_is_corrected_although_the_stamp_matches(network: CanNetwork) -> None:
     _boot(network)
     network.write(1, 0x6072, 0, 4000)

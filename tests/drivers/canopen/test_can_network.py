@@ -7,31 +7,14 @@ from functools import partial
 import pytest
 
 from cdpr_drivers.canopen.network import CanNetwork
-from cdpr_drivers.errors import BusError, SdoError
-from tests.drivers.axis_rig import Rig, open_network, start_simulator
+from cdpr_drivers.errors import SdoError
+from tests.drivers.axis_rig import Rig, open_network
 from tests.fault_texts import alarm
 
 
 @pytest.fixture
 def network(rig: Rig) -> CanNetwork:
     return rig.network
-
-
-@pytest.mark.parametrize(
-    ("index", "sub", "value", "words"),
-    [
-        (0x6041, 0, 1, "read only object"),
-        (0x6060, 0, 77, "06090030h"),
-        (0x1018, 1, 1, "06010002h"),
-    ],
-)
-def test_an_abort_is_reported_as_text_with_node_and_object(
-    network: CanNetwork, index: int, sub: int, value: int, words: str
-) -> None:
-    with pytest.raises(SdoError) as caught:
-        network.write(1, index, sub, value)
-    assert f"node 1: object {index:04X}h:{sub} cannot be set to {value}" in str(caught.value)
-    assert words in str(caught.value)
 
 
 def test_a_value_too_large_for_its_type_is_not_sent(network: CanNetwork) -> None:
@@ -54,10 +37,6 @@ def test_a_silent_node_is_reported_after_the_attempts(bus: str) -> None:
         assert network.clock.now_s - begin_s == pytest.approx(0.5)
 
 
-def test_long_values_are_read_in_segments(network: CanNetwork) -> None:
-    assert network.read(1, 0x1008) == "Generic CiA 402 torque servo"
-
-
 def test_several_tasks_may_read_from_one_node_simultaneously(rig: Rig) -> None:
     def work(node_objects: list[tuple[int, int, int]]) -> bool:
         return all(
@@ -78,25 +57,3 @@ def test_several_tasks_may_read_from_one_node_simultaneously(rig: Rig) -> None:
         rig.network.clock.run_tasks()
     assert all(task.result() for task in tasks)
     assert alarm(rig.group) == ""
-
-
-def test_emergencies_between_cycles_are_kept_and_raise_the_alarm(rig: Rig) -> None:
-    rig.set_mode()
-    rig.group.stop_cycling()
-    rig.misbehave(1, 0x8611)
-    clock = rig.network.clock
-    assert clock.wait(lambda: rig.network.emergencies, clock.now_s + 2.0)
-    kept = rig.network.emergencies[-1]
-    assert (kept.node_id, kept.code) == (1, 0x8611)
-    assert "8611h following error" in str(kept)
-    text, _ = rig.until_alarm(0.01)
-    assert "8611h" in text or "in fault" in text
-
-
-def test_a_killed_simulator_raises_bus_errors() -> None:
-    simulator = start_simulator()
-    with open_network(simulator.bus, [1]) as network:
-        assert network.read_int(1, 0x1000) == 0x00020192
-        simulator.stop()
-        with pytest.raises(BusError, match="is lost"):
-            network.read_int(1, 0x1000)

@@ -17,7 +17,7 @@ import pytest
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.simbus import open_clock
 from cdpr_drivers.canopen.lss import UNCONFIGURED, LssAddress, LssError, LssMaster
-from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
+from cdpr_drivers.errors import SdoAbortError, SdoTimeoutError
 from cdpr_profiles import load_drive
 from cdpr_rt.core.clock import PacedClock
 from cdpr_sim_bus.bus.hub import Hub
@@ -319,8 +319,3 @@ def test_a_babbling_node_does_not_block_the_search() -> None:
         finally:
             stop.set()
             thread.join()
-
-
-def test_a_missing_bus_raises_a_bus_error() -> None:
-    with pytest.raises(BusError):
-        LssMaster(BusUrl.parse("simbus:nobody-runs-this"), PacedClock())

@@ -1,19 +1,17 @@
 """One test for each row of the supervision table in docs/reference/supervision.md.
 
-The tests of some rows are in other files: master lost, bus gone, drive in fault, mode and state
-changes in test_axis_group, and a duplicate node id at boot in test_boot_network.
+The tests of some rows are in other files: master lost in hil/test_daemon_kills, bus gone and drive
+in fault in hil/test_command_faults, mode and state changes also in test_axis_group, and a duplicate
+node id at boot in test_boot_network.
 """
 
 from __future__ import annotations
 
-import socket
-import threading
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
-from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.health import BusState
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import STATE_TABLE, State
@@ -30,6 +28,7 @@ from tests.drivers.axis_rig import (
     open_rig,
 )
 from tests.drivers.axis_rig import start_simulator as _start_simulator
+from tests.drivers.bus.port_frames import GREETING, Server
 from tests.drivers.bus_log import BusLog, logged
 from tests.drivers.canopen.scripted_node import scripted
 from tests.fault_texts import alarm
@@ -299,49 +298,21 @@ def test_a_flood_of_emergencies_between_cycles_is_reported(three_drives: str) ->
 # -- the wire
 
 
-class _Server:
-    """A socketcand server that reports errors of its controller."""
-
-    def __init__(self) -> None:
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.url = f"socketcand://127.0.0.1:{self._listener.getsockname()[1]}/can0"
-        self._client: socket.socket | None = None
-        self._thread = threading.Thread(target=self._greet, daemon=True)
-        self._thread.start()
-
-    def _greet(self) -> None:
-        self._client, _ = self._listener.accept()
-        self._client.sendall(b"< hi >")
-        for _ in ("open", "rawmode"):
-            self._client.recv(100)
-            self._client.sendall(b"< ok >")
-
-    def tell(self, message: bytes) -> None:
-        self._thread.join(60.0)
-        assert self._client is not None
-        self._client.sendall(message)
-
-    def close(self) -> None:
-        if self._client is not None:
-            self._client.close()
-        self._listener.close()
-
-
 def test_bus_off_raises_an_alarm_until_the_controller_is_active_again() -> None:
-    server = _Server()
-    network = CanNetwork(BusUrl.parse(server.url), PacedClock(), [1], MASTER, HEARTBEAT_S)
+    server = Server(*GREETING)
+    network = CanNetwork(server.url, PacedClock(), [1], MASTER, HEARTBEAT_S)
     try:
         network.add_node(1, dictionary(1))
-        server.tell(b"< error 20000080 1.0 >")
+        server.client.sendall(b"< error 20000080 1.0 >")
         _eventually(network.clock, lambda: network.health.errors == 1)
         assert network.alarm_text == ""  # the controller repeats a disturbed frame
-        server.tell(b"< error 20000040 1.0 >")
+        server.client.sendall(b"< error 20000040 1.0 >")
         _eventually(network.clock, lambda: network.alarm_text)
         assert "the CAN controller is bus-off" in network.alarm_text
         assert "restart the interface" in network.alarm_text
         network.clear_alarm()
         assert "bus-off" in network.alarm_text  # the cause remains
-        server.tell(b"< error 20000100 1.0 >")
+        server.client.sendall(b"< error 20000100 1.0 >")
         _eventually(network.clock, lambda: network.health.state is BusState.ACTIVE)
         assert "bus-off" in network.alarm_text  # latched
         network.clear_alarm()

@@ -72,14 +72,6 @@ def test_the_contactor_closes_when_asked_and_opens_at_the_end(
     assert not io_device.coil(0)
 
 
-def test_an_open_chain_prevents_power(io_device: SafetyIoProcess, winch: BoardAxis) -> None:
-    io_device.press()
-    with (
-        SafetyIo(io_device.profile(), CLOCK) as io,
-        pytest.raises(SafetyIoError, match="chain is open"),
-    ):
-        io.energise()
-    assert not io_device.coil(0)
 
 
 def test_the_emergency_stop_trips_until_it_is_acknowledged(
@@ -215,14 +207,6 @@ def test_a_contactor_without_feedback_is_detected(
         wait_until(lambda: not io_device.coil(0))
 
 
-def test_a_brake_that_does_not_follow_is_detected(io_device: SafetyIoProcess) -> None:
-    with SafetyIo(io_device.profile(), CLOCK) as io:
-        io.energise()
-        io_device.break_(SafetyIoFault.BRAKES_STUCK)
-        io.release_brakes("winch 1")
-        with pytest.raises(SafetyIoError, match=r"brake of winch 1 is not released .* output 1"):
-            io.await_brakes(True, "winch 1")
-        assert "brake of winch 1" in io.alarm()
 
 
 def test_an_output_changed_by_another_client_is_detected(io_device: SafetyIoProcess) -> None:
@@ -235,16 +219,6 @@ def test_an_output_changed_by_another_client_is_detected(io_device: SafetyIoProc
         io_device.break_(SafetyIoFault(0))
 
 
-def test_a_second_command_cannot_open_the_device_and_does_not_cut_power(
-    io_device: SafetyIoProcess, winch: BoardAxis
-) -> None:
-    with SafetyIo(io_device.profile(), CLOCK) as io:
-        io.energise()
-        with pytest.raises(SafetyIoError, match="another command uses it"):
-            SafetyIo(io_device.profile(), CLOCK).open()
-        CLOCK.sleep(0.1)
-        assert winch.power_allowed
-        assert not io.alarm()
 
 
 def test_an_unexpected_error_in_a_poll_trips_and_power_is_cut_at_close(
