@@ -10,7 +10,7 @@ import pytest
 
 from cdpr_profiles import load_motor, load_motor_ratings
 from cdpr_profiles.cable import N_PER_KGF
-from cdpr_profiles.motor import RAD_S_PER_RPM, Motor, MotorDetail, MotorRatings, MotorSeries
+from cdpr_profiles.motor import RAD_S_PER_RPM, MotorDetail, MotorRatings, MotorSeries
 from cdpr_profiles.places import SHIPPED
 from cdpr_profiles.reader import read_toml_model
 
@@ -31,10 +31,6 @@ def _within_last_digit(a: float, b: float, factor: float, digit_a: float, digit_
     return abs(a * factor - b) <= 0.5001 * (digit_a * factor + digit_b) + 3e-4 * abs(b)
 
 
-def test_series_has_19_models_for_230_volts_25_for_460_volts_and_sheets_of_size_92():
-    assert (len(ROWS_230), len(ROWS_460)) == (19, 25)
-    assert len(ROWS) == 44
-    assert set(SERIES.detail) == {m for m in ROWS if m.startswith("092")}
 
 
 @pytest.mark.parametrize("row", ROWS.values(), ids=ROWS)
@@ -103,35 +99,5 @@ def test_mpj_inertia_of_size_92_is_taken_from_the_size_sheet():
     assert any("0922" in note for note in SERIES.notes)
 
 
-def test_three_rows_equal_the_printed_table():
-    assert tuple(ROWS["0923D"].model_dump().values()) == (
-        *("0923D", 4947.33, 1.55, 2.07, 1.00e-3, 1.13e-4, None, None),
-        *(4.03, 35.63, 11.55, 102.23, 7.23, 22.85),
-    )
-    assert tuple(ROWS["1426P"].model_dump().values()) == (
-        *("1426P", 3371.51, 6.26, 8.35, 1.90e-2, 2.15e-3, 7.38e-2, 8.34e-3),
-        *(25.70, 227.47, 72.25, 639.38, 13.07, 41.31),
-    )
-    assert tuple(ROWS["2708N"].model_dump().values()) == (
-        *("2708N", 1961.51, 21.13, 28.17, 3.13e-1, 3.54e-2, None, None),
-        *(149.65, 1324.37, 386.95, 3424.50, 49.96, 157.89),
-    )
 
 
-def test_thesis_motor_has_the_printed_figures():
-    motor = load_motor("MPP0923D")
-    assert isinstance(motor, Motor)
-    assert motor.pole_pairs == 4
-    assert motor.torque_constant_Nm_per_Arms == 0.561
-    assert (motor.rated_torque_Nm, motor.stall_torque_Nm, motor.peak_torque_Nm) == (
-        3.0,
-        4.03,
-        11.55,
-    )
-    assert (motor.rated_current_Arms, motor.peak_current_Arms) == (5.59, 22.8)
-    assert motor.rated_speed_rad_s == pytest.approx(518.05, abs=0.01)
-    assert motor.rated_torque_Nm * motor.rated_speed_rad_s == pytest.approx(1550, abs=5)
-    assert (motor.resistance_ohm, motor.inductance_H) == (1.20, pytest.approx(6e-3))
-    assert motor.rotor_inertia_kg_m2 == 1.130e-4
-    assert motor.max_dc_bus_voltage_V == 340
-    assert load_motor("MPP0923R").max_dc_bus_voltage_V == 650

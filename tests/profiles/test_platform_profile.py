@@ -23,17 +23,6 @@ def changed(folder: Path, *replaced: tuple[str, str]) -> Path:
     return path
 
 
-def test_the_shipped_platform_hangs_on_three_cables() -> None:
-    platform = load_robot("planar-3").platform
-    assert platform is not None and platform.is_planar
-    assert len(platform.exit_points_m) == len(platform.anchor_points_m) == 3
-    sides = [
-        sum((a - b) ** 2 for a, b in zip(p, q, strict=True)) ** 0.5
-        for p in platform.anchor_points_m
-        for q in platform.anchor_points_m
-        if p != q
-    ]
-    assert sides == pytest.approx([0.15] * 6, abs=1e-4)  # the thesis' triangle
 
 
 def test_missing_keys_get_defaults() -> None:

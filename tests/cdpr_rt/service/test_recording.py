@@ -260,8 +260,8 @@ def test_reading_a_corrupt_recording_ends_at_the_corruption(tmp_path: Path) -> N
         list(RecordingReader(path).cycles(["position_rad"]))
 
 
-def test_damaged_length_fields_do_not_exhaust_memory(recorded: Path, tmp_path: Path) -> None:
-    data = bytearray(recorded.read_bytes())
+def test_damaged_length_fields_do_not_exhaust_memory(tmp_path: Path) -> None:
+    data = bytearray(_recorded(tmp_path, 100).read_bytes())
     chunk = data.index(b"\x06", 8 + 9 + 20)
     path = tmp_path / "damaged.mcap"
     for at in range(chunk, chunk + 60):
