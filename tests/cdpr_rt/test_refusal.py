@@ -46,10 +46,7 @@ REFUSALS = [
     ),
     (
         CommandRefusal(
-            RefusalCode.NOTHING_LEFT,
-            "path",
-            {"resume": True},
-            {"left": "path", "instead": "plan"},
+            RefusalCode.NOTHING_LEFT, "path", {"resume": True}, {"left": "path", "instead": "plan"}
         ),
         "path: resume: there is no path to continue; allowed: plan",
     ),

@@ -42,15 +42,9 @@ def test_torques_are_converted_to_each_torque_unit(
 
 def test_a_torque_slope_is_per_second_and_clamped_to_its_object() -> None:
     slow = drive(torque_unit="cNm", torque_slope_Nm_s=20.0)
-    assert list(torque_settings(slow, 1e-2, 1.0)) == [
-        (0x6072, 100),
-        (0x6087, 2000),
-    ]
+    assert list(torque_settings(slow, 1e-2, 1.0)) == [(0x6072, 100), (0x6087, 2000)]
     fast = drive(torque_unit="mNm", torque_slope_Nm_s=1e9)
-    assert list(torque_settings(fast, 1e-3, 100.0)) == [
-        (0x6072, 0xFFFF),
-        (0x6087, 0xFFFFFFFF),
-    ]
+    assert list(torque_settings(fast, 1e-3, 100.0)) == [(0x6072, 0xFFFF), (0x6087, 0xFFFFFFFF)]
 
 
 @pytest.mark.parametrize(

@@ -13,14 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_lab import (
-    KEY,
-    angles,
-    running,
-    setpoints,
-    with_key,
-    with_power,
-)
+from daemon_lab import KEY, angles, running, setpoints, with_key, with_power
 from daemon_rig import NAME, RealDaemon, until
 
 from cdpr_tools.cli import main

@@ -18,9 +18,7 @@ from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until
 from cdpr_tools.bench.flood import Target
 
 
-def test_a_daemon_whose_output_is_closed_restarts_its_service(
-    tmp_path: Path,
-) -> None:
+def test_a_daemon_whose_output_is_closed_restarts_its_service(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     daemon = RealDaemon(tmp_path, "--no-record", stderr=writer)
     try:

@@ -80,9 +80,7 @@ def test_estop_cuts_power_immediately_while_the_service_hangs_and_leaves_a_fault
 
 
 @paced
-def test_estop_kills_a_hanging_loop_and_reports_it_as_unconfirmed(
-    tmp_path: Path,
-) -> None:
+def test_estop_kills_a_hanging_loop_and_reports_it_as_unconfirmed(tmp_path: Path) -> None:
     daemon = slow_daemon(tmp_path)
     try:
         with in_motion(daemon) as ear:

@@ -16,16 +16,7 @@ import httpx
 import pytest
 import requests
 import schemathesis
-from daemon_lab import (
-    RIGHT,
-    angles,
-    events,
-    happened,
-    holding,
-    running,
-    with_key,
-    with_power,
-)
+from daemon_lab import RIGHT, angles, events, happened, holding, running, with_key, with_power
 from daemon_rig import PATIENCE_S, RealDaemon, alive, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

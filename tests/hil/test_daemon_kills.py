@@ -160,9 +160,7 @@ def expect_stop(ear: Ear, at_s: float) -> None:
     assert not ear.of(0x200 + NODES[0], at_s + SLACK_S)
 
 
-def test_drives_stop_within_two_heartbeats_of_a_hanging_loop(
-    daemon: RealDaemon,
-) -> None:
+def test_drives_stop_within_two_heartbeats_of_a_hanging_loop(daemon: RealDaemon) -> None:
     loop = daemon.children()["loop"]
     with in_motion(daemon) as ear:
         at_s = time.monotonic()

@@ -139,11 +139,7 @@ def live_port_of(daemon: RealDaemon) -> int:
 
 def test_another_user_cannot_take_a_port_while_the_service_restarts(daemon: RealDaemon) -> None:
     http, live, stream = http_port_of(daemon), live_port_of(daemon), port_of(daemon)
-    ports = {
-        http: socket.SOCK_STREAM,
-        live: socket.SOCK_STREAM,
-        stream: socket.SOCK_DGRAM,
-    }
+    ports = {http: socket.SOCK_STREAM, live: socket.SOCK_STREAM, stream: socket.SOCK_DGRAM}
     service = daemon.children()["service"]
 
     def take() -> object:

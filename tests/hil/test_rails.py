@@ -18,15 +18,7 @@ from rails_rig import ANSWER_S, MASTER_S, Rails, another_winch, patient_rail
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
-from safety_rig import (
-    CLOCK,
-    SafetyIoProcess,
-    board_file,
-    patient_profile,
-    ready,
-    start,
-    wait_until,
-)
+from safety_rig import CLOCK, SafetyIoProcess, board_file, patient_profile, ready, start, wait_until
 
 from cdpr_drivers.modbus.safety_io import SafetyIoError
 from cdpr_drivers.robot.rail import Cia402RailAxis, ModbusRailAxis, RailError

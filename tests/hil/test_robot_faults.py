@@ -94,9 +94,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(
-    ("what", "told", "carries"),
-    FAULTS,
-    ids=["drive", "cut", "lower-cut", "jump"],
+    ("what", "told", "carries"), FAULTS, ids=["drive", "cut", "lower-cut", "jump"]
 )
 def test_the_remaining_winches_lower_the_platform(
     hanging: LockstepRobot, what: tuple[int, int, int], told: tuple[str, ...], carries: bool
@@ -144,9 +142,7 @@ def test_a_platform_held_by_friction_is_at_rest_before_power_is_cut(
         assert height_m(truth.read()) == pytest.approx(HIGH[1] - 1.3, abs=0.02)
 
 
-def test_a_drive_that_goes_pre_operational_is_switched_off_in_time(
-    hanging: LockstepRobot,
-) -> None:
+def test_a_drive_that_goes_pre_operational_is_switched_off_in_time(hanging: LockstepRobot) -> None:
     axis = hanging.robot.axes[UPPER_LEFT]
     network = hanging.machine.networks[axis.bus]
     truth = Truth(hanging)
@@ -247,9 +243,7 @@ def test_a_second_fault_during_a_reaction_is_reported_in_the_notices(
     assert any(named in note and told in note for note in notes), notes
 
 
-def test_a_cable_slack_after_landing_is_reported_as_possibly_broken(
-    hanging: LockstepRobot,
-) -> None:
+def test_a_cable_slack_after_landing_is_reported_as_possibly_broken(hanging: LockstepRobot) -> None:
     hanging.inject(UPPER_LEFT, FAULT, 0x7305)  # the platform swings down on the other upper cable
     end_of_fault(hanging)
     notes = [note for note in hanging.status()["notices"] if "seems broken" in note]
@@ -358,9 +352,7 @@ def test_drives_that_are_all_silent_for_too_many_cycles_lower_the_platform(
     assert -truth.read()["velocity_m_s"][:, 1].min() < 0.45
 
 
-def test_a_target_outside_the_workspace_is_rejected_without_motion(
-    hanging: LockstepRobot,
-) -> None:
+def test_a_target_outside_the_workspace_is_rejected_without_motion(hanging: LockstepRobot) -> None:
     truth = Truth(hanging)
     for position, named in (
         ([0.0, 5.0], "y 5000 mm; allowed: 1400 to 2400 mm, the workspace"),
@@ -408,9 +400,7 @@ def test_set_points_with_nan_are_not_followed(hanging: LockstepRobot) -> None:
     assert hanging.state is LoopState.ACTIVE
 
 
-def test_the_platform_is_held_when_the_hand_disappears_in_motion(
-    hanging: LockstepRobot,
-) -> None:
+def test_the_platform_is_held_when_the_hand_disappears_in_motion(hanging: LockstepRobot) -> None:
     hanging.program("pose", position_m=[-0.4, 2.1], speed_m_s=0.2)
     hanging.run(0.5)
     hanging.right.fall_silent()

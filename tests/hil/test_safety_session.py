@@ -183,8 +183,6 @@ def test_an_open_chain_is_reported_before_power_is_on(lab: Lab) -> None:
     assert not lab.io_device.coil(0)
 
 
-
-
 def test_a_brake_that_stays_applied_ends_the_session(lab: Lab) -> None:
     lab.io_device.break_(SafetyIoFault.BRAKES_STUCK)
     error = lab.refused_jog(1)

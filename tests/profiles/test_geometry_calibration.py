@@ -17,10 +17,7 @@ from cdpr_profiles.calibration_in_force import (
     take_over,
     undo,
 )
-from cdpr_profiles.geometry_calibration import (
-    GeometryCalibration,
-    geometry_sha256,
-)
+from cdpr_profiles.geometry_calibration import GeometryCalibration, geometry_sha256
 from cdpr_profiles.places import SHIPPED
 
 

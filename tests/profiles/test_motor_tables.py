@@ -31,8 +31,6 @@ def _within_last_digit(a: float, b: float, factor: float, digit_a: float, digit_
     return abs(a * factor - b) <= 0.5001 * (digit_a * factor + digit_b) + 3e-4 * abs(b)
 
 
-
-
 @pytest.mark.parametrize("row", ROWS.values(), ids=ROWS)
 def test_columns_of_a_row_agree(row: MotorRatings):
     w = _within_last_digit
@@ -97,7 +95,3 @@ def test_mpj_inertia_of_size_92_is_taken_from_the_size_sheet():
     assert row.mpj_inertia_kg_m2 == row.mpp_inertia_lb_in_s2
     assert load_motor("MPJ0922D").rotor_inertia_kg_m2 == 4.261e-4
     assert any("0922" in note for note in SERIES.notes)
-
-
-
-

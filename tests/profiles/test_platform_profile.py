@@ -23,8 +23,6 @@ def changed(folder: Path, *replaced: tuple[str, str]) -> Path:
     return path
 
 
-
-
 def test_missing_keys_get_defaults() -> None:
     platform = load_robot("planar-3").platform
     assert platform is not None
@@ -63,11 +61,7 @@ def test_values_of_the_file_are_read(tmp_path: Path) -> None:
     ("replaced", "key", "problem"),
     [
         (("exit_point_m = [0.0, 0.0]\n", ""), "axes[2].exit_point_m", "missing"),
-        (
-            ("[0.0, 0.0]", "[0.0, 0.0, 0.0]"),
-            "axes[2].exit_point_m",
-            "2 coordinates, as platform",
-        ),
+        (("[0.0, 0.0]", "[0.0, 0.0, 0.0]"), "axes[2].exit_point_m", "2 coordinates, as platform"),
         (("[0.0, 0.0]", "[0.0, 2000.0]"), "axes[2].exit_point_m[1]", "-1000 to 1000, in metres"),
         (("home_m = [0.0, 1.3]", "home_m = [0.7, 1.3]"), "platform.home_m[0]", "-0.6 to 0.6"),
         (("home_m = [0.0, 1.3]", "home_m = [0.0, 2.5]"), "platform.home_m[1]", "up to 2.4"),
@@ -185,9 +179,7 @@ def test_anchor_points_a_millimetre_apart_are_rejected(tmp_path: Path) -> None:
         load_robot(path)
 
 
-def test_polygon_centroid_allows_at_most_two_more_cables_than_directions(
-    tmp_path: Path,
-) -> None:
+def test_polygon_centroid_allows_at_most_two_more_cables_than_directions(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     polygon = 'controlled = ["x", "y", "z"]\ntension_distribution = "polygon-centroid"\nmass_kg'
     text = re.sub(r"workspace_angle_rad.*\n", "", HALL.replace("mass_kg", polygon, 1))
@@ -247,11 +239,7 @@ def test_body_and_obstacles_have_as_many_dimensions_as_the_robot(tmp_path: Path)
     assert platform.clearance_m == 0.01
     for wrong, key, problem in (
         ("max_m = [0.1, -0.1]", "platform.obstacles[0].max_m[1]", "above 0"),
-        (
-            "max_m = [0.1, 0.2, 0.3]",
-            "platform.obstacles[0].max_m",
-            "3]; allowed: 2",
-        ),
+        ("max_m = [0.1, 0.2, 0.3]", "platform.obstacles[0].max_m", "3]; allowed: 2"),
         ("max_m = [0.1, 2000.0]", "platform.obstacles[0].max_m[1]", "in metres"),
         ("max = [0.1, 0.2]", "platform.obstacles[0].max", "did you mean 'max_m'?"),
     ):

@@ -40,10 +40,7 @@ FILES = {
     for kind in KINDS
     for path in sorted((SHIPPED / kind).glob("*.toml"))
 }
-repeatable = settings(
-    max_examples=60,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+repeatable = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 files = st.sampled_from(list(FILES))
 JUNK = [-1e6, math.nan, math.inf, "three", True, {}, [[]]]
 

@@ -20,10 +20,7 @@ from hypothesis import strategies as st
 
 from cdpr_sim_bus.frame import pack_frame
 
-LAW = settings(
-    max_examples=6,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+LAW = settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 GO = struct.Struct("<8sdd")
 SYNC = 0x080
 _names = count()
@@ -97,9 +94,7 @@ class Bus:
 def simulator(log: Path) -> Iterator[tuple[subprocess.Popen[bytes], list[Bus]]]:
     name = f"same-{os.getpid()}-{next(_names)}"
     process = subprocess.Popen(
-        [*FORKED, SIMULATOR, name, str(log)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
+        [*FORKED, SIMULATOR, name, str(log)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert process.stdin and process.stdout
     buses: list[Bus] = []

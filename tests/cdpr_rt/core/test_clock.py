@@ -48,9 +48,7 @@ naps = st.lists(st.sampled_from([0.0, 0.001, 0.25, 0.5, 1.0, 3.0]), max_size=6)
 
 
 @given(st.lists(naps, max_size=5))
-def test_tasks_continue_by_time_and_then_in_starting_order(
-    plans: list[list[float]],
-) -> None:
+def test_tasks_continue_by_time_and_then_in_starting_order(plans: list[list[float]]) -> None:
     clock = LockstepClock()
     told: list[tuple[float, int]] = []
 

@@ -111,15 +111,7 @@ def test_arbitrary_torques_never_exceed_the_limits(
 ) -> None:
     supervisor, cycle = Supervisor(with_rate(100.0), 2, PERIOD_S), Cycle()
     last = np.zeros(2)
-    for (
-        torque_Nm,
-        speed_rad_s,
-        position,
-        wanted,
-        wanted_speed,
-        *cable,
-        flags,
-    ) in cycles:
+    for torque_Nm, speed_rad_s, position, wanted, wanted_speed, *cable, flags in cycles:
         cycle.torque[:] = torque_Nm
         cycle.estimate.velocity_rad_s[1] = speed_rad_s
         cycle.feedback.position_rad[1] = position

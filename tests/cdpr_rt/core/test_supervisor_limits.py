@@ -178,9 +178,7 @@ CASES = [
         does_not=(behind(0.19), behind(-0.19)),
     ),
     Case(
-        Limit.FOLLOWING_ERROR,
-        behind(math.nan),
-        "axis 2: following error nan deg, 11.5 deg allowed",
+        Limit.FOLLOWING_ERROR, behind(math.nan), "axis 2: following error nan deg, 11.5 deg allowed"
     ),
     Case(
         Limit.CABLE_LENGTH,

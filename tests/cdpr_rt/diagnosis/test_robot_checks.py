@@ -145,9 +145,7 @@ def test_the_axis_of_a_rod_that_needs_no_control_is_reported(tmp_path: Path) -> 
         assert told.endswith(free)
 
 
-def test_infeasible_orientations_are_reported_with_the_feasible_angle(
-    tmp_path: Path,
-) -> None:
+def test_infeasible_orientations_are_reported_with_the_feasible_angle(tmp_path: Path) -> None:
     text = SUSPENDED.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.6")
     told = findings_of(tmp_path, text)["platform.workspace_min_m"]
     assert re.search(
@@ -311,8 +309,7 @@ def test_infeasible_settings_are_reported_with_a_remedy(
     assert any(problem in found.text and found.impossible is impossible for found in about), about
     # compute the findings, which take seconds, only once
     monkeypatch.setattr(
-        "cdpr_rt.diagnosis.checks.diagnose",
-        lambda asked, _limits: told if asked is robot else [],
+        "cdpr_rt.diagnosis.checks.diagnose", lambda asked, _limits: told if asked is robot else []
     )
     if impossible:
         with pytest.raises(ProfileError, match=r"mine\.toml: ") as caught:

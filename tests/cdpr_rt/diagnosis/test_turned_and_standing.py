@@ -62,9 +62,7 @@ def test_an_angle_that_is_held_nowhere_in_the_box_is_impossible(tmp_path: Path) 
         assert "platform.workspace_angle_rad" not in told
 
 
-def test_smaller_angles_with_contact_everywhere_are_not_skipped(
-    tmp_path: Path,
-) -> None:
+def test_smaller_angles_with_contact_everywhere_are_not_skipped(tmp_path: Path) -> None:
     path = tmp_path / "crossed.toml"
     refused = r"turned by 6\.88 deg about x, .*; allowed: up to 0\.08$"
     for angle in (0.1, 0.12, 0.128, 0.3, 0.4, 0.5, 2.0):

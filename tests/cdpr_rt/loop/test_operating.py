@@ -124,9 +124,7 @@ def test_alarm_speed_and_following_error_trip_the_motion() -> None:
             rig.follow()
 
 
-def test_a_motion_can_be_repeated_after_its_fault_is_acknowledged(
-    tmp_path: Path,
-) -> None:
+def test_a_motion_can_be_repeated_after_its_fault_is_acknowledged(tmp_path: Path) -> None:
     with powered() as rig:
         rig.device.alarm_at = rig.began + 100
         with pytest.raises(TripError):

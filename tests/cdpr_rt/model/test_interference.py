@@ -218,9 +218,7 @@ def test_a_flat_platform_that_turns_is_proved_clear_in_few_steps() -> None:
 
 
 @pytest.mark.parametrize("shared", ["anchor points", "exit points"])
-def test_a_long_way_of_cables_that_share_a_point_is_proved_clear_in_few_steps(
-    shared: str,
-) -> None:
+def test_a_long_way_of_cables_that_share_a_point_is_proved_clear_in_few_steps(shared: str) -> None:
     """A camera in a stadium, and a platform on three pairs of cables that share exit points."""
     if shared == "anchor points":
         exits = np.array([(x, y, 30.0) for x in (-50.0, 50.0) for y in (-30.0, 30.0)])

@@ -14,13 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.model.kinematics import (
-    PLANAR,
-    PLANAR_POINT,
-    POINT,
-    SPATIAL,
-    CableKinematics,
-)
+from cdpr_rt.model.kinematics import PLANAR, PLANAR_POINT, POINT, SPATIAL, CableKinematics
 from cdpr_rt.model.pose import Pose
 from tests.cdpr_rt.model.shipped_points import COGIRO, SPATIAL_8
 
@@ -227,9 +221,7 @@ def test_an_anchor_point_in_its_exit_point_or_pulley_is_rejected() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.05])
-def test_the_geometric_stiffness_is_the_derivative_of_the_tensions_wrench(
-    radius: float,
-) -> None:
+def test_the_geometric_stiffness_is_the_derivative_of_the_tensions_wrench(radius: float) -> None:
     rng = np.random.default_rng(11)
     robot = CableKinematics(*made_up(SPATIAL, 7, rng), SPATIAL, pulley_radius_m=radius)
     tension_N, pose = rng.uniform(10.0, 100.0, 7), Pose(np.array([0.1, -0.2, 1.1]))

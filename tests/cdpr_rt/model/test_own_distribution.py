@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.model.own_distribution import (
-    TOLERANCE,
-    OwnDistribution,
-    TensionDistributionError,
-)
+from cdpr_rt.model.own_distribution import TOLERANCE, OwnDistribution, TensionDistributionError
 
 W = np.array([[1.0, -1.0, 0.2], [0.0, 0.0, 1.0]])
 WRENCH = np.array([0.0, -100.0])

@@ -14,11 +14,7 @@ from scipy.optimize import linprog, lsq_linear
 from scipy.spatial import ConvexHull, Delaunay, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.model.tension_distribution import (
-    METHODS,
-    TensionOutcome,
-    TensionSolver,
-)
+from cdpr_rt.model.tension_distribution import METHODS, TensionOutcome, TensionSolver
 from tests.cdpr_rt.model.cable_robots import (
     SCALE,
     WEIGHT,

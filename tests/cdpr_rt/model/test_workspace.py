@@ -12,13 +12,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.model.kinematics import (
-    PLANAR,
-    PLANAR_POINT,
-    POINT,
-    SPATIAL,
-    CableKinematics,
-)
+from cdpr_rt.model.kinematics import PLANAR, PLANAR_POINT, POINT, SPATIAL, CableKinematics
 from cdpr_rt.model.pose import Pose
 from cdpr_rt.model.workspace import SHARES, CableWorkspace, corners, wrenches_in_motion
 from tests.cdpr_rt.model.shipped_points import COGIRO

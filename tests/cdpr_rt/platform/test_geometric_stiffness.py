@@ -7,21 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_rt.platform.loop_design import (
-    FOLLOWED_MARGIN,
-    LEAST_MARGIN,
-    LoopModel,
-    UnstableError,
-)
+from cdpr_rt.platform.loop_design import FOLLOWED_MARGIN, LEAST_MARGIN, LoopModel, UnstableError
 from cdpr_rt.platform.loop_plant import geometric_stiffness, planned_tensions
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from tests.cdpr_rt.platform.linear_cycle import (
-    loop_model,
-    radius,
-    rigidity,
-    rotors,
-    turned_wrench,
-)
+from tests.cdpr_rt.platform.linear_cycle import loop_model, radius, rigidity, rotors, turned_wrench
 from tests.cdpr_rt.platform.platform_physics import (
     PERIOD_S,
     Machine,

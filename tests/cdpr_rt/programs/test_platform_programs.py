@@ -83,9 +83,7 @@ def test_a_second_tightening_takes_up_slack_like_the_first(monkeypatch: pytest.M
         assert not robot.until_done(20.0)["trouble"]
 
 
-def test_cables_already_under_tension_never_exceed_the_pretension(
-    robot: Standing,
-):
+def test_cables_already_under_tension_never_exceed_the_pretension(robot: Standing):
     robot.loosen((0.0, 0.0, 0.0))
     full_N = home_pretension_N(robot.parts)
     robot.torque[:] = -full_N * robot.cable_m

@@ -151,11 +151,7 @@ def test_a_platform_turned_too_far_is_turned_back_to_the_allowed_angle(
         ("rotation_rad", "far", r"rotation_rad: value .* deg from the orientation at home; "),
         ("rotation_rad", "nan", r"rotation_rad\[0\]: value nan"),
         ("rotation_rad", "many", "rotation_rad: value .* allowed: a list of [13], one number"),
-        (
-            "position_m",
-            "far",
-            r"position_m: value .* 5000 mm; allowed: .* mm, the workspace",
-        ),
+        ("position_m", "far", r"position_m: value .* 5000 mm; allowed: .* mm, the workspace"),
         ("position_m", "many", "position_m: value .* allowed: a list of [23], one number"),
     ],
 )

@@ -150,9 +150,7 @@ def test_a_platform_that_may_swing_is_reported_on_arrival() -> None:
     assert told["done"] and "may still swing by" in told["trouble"]
 
 
-def test_a_platform_kept_off_its_target_by_friction_is_awaited_for_5_s(
-    robot: LedPlatform,
-) -> None:
+def test_a_platform_kept_off_its_target_by_friction_is_awaited_for_5_s(robot: LedPlatform) -> None:
     robot.program.command({"position_m": [0.1, 1.9]})
     robot.stretch_rad[:] = 0.12, 0.12, -0.12
     robot.until_rest()
@@ -178,10 +176,7 @@ def test_a_target_that_changes_in_motion_does_not_step(robot: LedPlatform) -> No
 @pytest.mark.parametrize(
     ("wanted", "told"),
     [
-        (
-            {"position_m": [0.7, 1.9]},
-            "x 700 mm; allowed: -600 to 600 mm, the workspace",
-        ),
+        ({"position_m": [0.7, 1.9]}, "x 700 mm; allowed: -600 to 600 mm, the workspace"),
         ({"position_m": [float("nan"), 1.9]}, r"position_m\[0\]"),
         ({"position_m": [0.0, 1.9, 0.0]}, "a list of 2"),
         ({"position_m": [0.0, 1.9], "stream": True}, "one of"),
@@ -216,9 +211,7 @@ def wide(made_wide: LedPlatform) -> LedPlatform:
     return made_wide
 
 
-def test_an_infeasible_position_in_the_box_is_rejected_with_the_reason(
-    wide: LedPlatform,
-) -> None:
+def test_an_infeasible_position_in_the_box_is_rejected_with_the_reason(wide: LedPlatform) -> None:
     with pytest.raises(ProgramError, match=r"cable \d would need .* N outside"):
         wide.program.command({"position_m": [1.7, 0.8]})
     wide.program.command({"stream": True})
@@ -278,9 +271,7 @@ def test_a_way_between_places_on_the_border_reaches_its_end(
     assert all(wide.control.is_feasible(place) for place in wide.path)
 
 
-def test_a_platform_can_leave_an_infeasible_position(
-    wide: LedPlatform,
-) -> None:
+def test_a_platform_can_leave_an_infeasible_position(wide: LedPlatform) -> None:
     wide.run(0.1)
     stand = np.array([0.0, 2.7])
     wide.restart(stand)

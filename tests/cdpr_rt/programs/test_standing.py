@@ -98,9 +98,7 @@ def test_slack_is_not_wound_in_if_cables_are_too_short_for_home(parts: PlatformP
         assert not why_not_to_wind_in(parts, home_m + slack_m - (0.3 + slack_m) * np.eye(n)[2])
 
 
-def test_a_platform_does_not_rest_if_upward_tensions_carry_its_weight(
-    parts: PlatformParts,
-) -> None:
+def test_a_platform_does_not_rest_if_upward_tensions_carry_its_weight(parts: PlatformParts) -> None:
     model, control, n = parts.model, parts.control, parts.control.low_N.size
     feedback, tension_N = AxisFeedback(n), parts.estimator.estimate.tension_N
     length_m = control.lengths_at_home(control.low_N)

@@ -13,9 +13,7 @@ from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.listening import listen_udp
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import (
-    StreamSession,
-)
+from cdpr_rt.service.stream_packet import StreamSession
 
 
 class Robot:

@@ -48,9 +48,7 @@ def test_the_holder_of_the_right_moves_and_others_learn_its_name(rig: Rig) -> No
         headers = take(client)
         wanted = {"velocity_rad_s": [0.5, 0]}
         answer = client.post(
-            "/enable",
-            json={"program": "jog", "wanted": wanted, "client": "maria"},
-            headers=headers,
+            "/enable", json={"program": "jog", "wanted": wanted, "client": "maria"}, headers=headers
         )
         assert answer.json() == {"text": "", "state": "active"}
         refused = client.post("/control", json={"client": "jan"})
@@ -174,9 +172,7 @@ def test_a_released_right_ends_immediately_in_the_loop(rig: Rig) -> None:
     assert rig.lease_left_s < 0.0
 
 
-def test_the_right_outlasts_a_long_command_but_not_a_client_that_disconnects(
-    rig: Rig,
-) -> None:
+def test_the_right_outlasts_a_long_command_but_not_a_client_that_disconnects(rig: Rig) -> None:
     rig.loop.answers = False
     with rig.client() as client:
         headers = take(client, ttl_s=5.0)

@@ -16,9 +16,7 @@ from hypothesis import strategies as st
 
 from cdpr_rt.service import setpoint_stream, stream_client
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import (
-    StreamSetpoint,
-)
+from cdpr_rt.service.stream_packet import StreamSetpoint
 from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot, until
 from tests.cdpr_rt.service.stream_session_rig import KEY, StreamRig
 

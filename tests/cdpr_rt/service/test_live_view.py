@@ -180,9 +180,7 @@ def test_axes_with_names_that_differ_only_in_punctuation_are_all_shown() -> None
     assert set(json.loads(messages["/axes"][-1][1])) == {"top_left", "top_left_"}
 
 
-def test_invalid_requests_leave_no_lines_in_the_log(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_invalid_requests_leave_no_lines_in_the_log(caplog: pytest.LogCaptureFixture) -> None:
     with running(block_with_clock()) as view:
         port = int(view.status()["url"].rsplit(":", 1)[1])
         for _ in range(10):

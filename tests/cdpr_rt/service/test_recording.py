@@ -15,13 +15,7 @@ from cdpr_rt.core.states import Reaction
 from cdpr_rt.motion.pose_stream import confirmation, stream_buttons
 from cdpr_rt.service.recording import EventDetector, Recorder
 from cdpr_rt.service.recording_file import RecordingError
-from cdpr_rt.service.recording_reader import (
-    CLOSED,
-    CUT,
-    KILLED,
-    Columns,
-    RecordingReader,
-)
+from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, Columns, RecordingReader
 from tests.cdpr_rt.service.recording_rig import (
     DESCRIPTION,
     RecorderProcess,

@@ -173,9 +173,7 @@ def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     assert stock_cycles(path) == list(range(10))
 
 
-def test_retention_removes_the_oldest_recordings_beyond_age_and_size(
-    tmp_path: Path,
-) -> None:
+def test_retention_removes_the_oldest_recordings_beyond_age_and_size(tmp_path: Path) -> None:
     def leave(name: str, days: float) -> Path:
         path = tmp_path / name
         path.write_bytes(bytes(1000))

@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 
 from cdpr_rt.core.cycle_row import AXES, FIELDS, SCALARS, WALL_TIMES, cycle_dtype
 from cdpr_rt.service.recording import RowTexts
-from cdpr_rt.service.recording_file import (
-    CYCLE_FIELDS,
-    TIMING_FIELDS,
-    cycle_schema,
-    timing_schema,
-)
+from cdpr_rt.service.recording_file import CYCLE_FIELDS, TIMING_FIELDS, cycle_schema, timing_schema
 from tests.cdpr_rt.service.recording_rig import made_rows
 
 _TEXTS = {n: RowTexts(n, FIELDS) for n in (1, 16)}

@@ -16,9 +16,7 @@ import pytest
 
 from cdpr_rt.service.listening import ListenError, listen_udp
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import (
-    Standing,
-)
+from cdpr_rt.service.stream_packet import Standing
 from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot, until
 from tests.cdpr_rt.service.stream_session_rig import KEY
 
@@ -26,10 +24,7 @@ from tests.cdpr_rt.service.stream_session_rig import KEY
 @pytest.mark.parametrize("key", [None, KEY])
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
 def test_a_client_streams_and_receives_the_robots_state(host: str, key: bytes | None) -> None:
-    with (
-        robot(key, host) as there,
-        StreamClient(host, there.port, key or there.give()) as client,
-    ):
+    with robot(key, host) as there, StreamClient(host, there.port, key or there.give()) as client:
         begin = time.monotonic()
         told: dict[str, Any] = {}
 
@@ -76,14 +71,6 @@ def test_a_client_continues_after_the_robot_has_restarted(monkeypatch: pytest.Mo
     finally:
         client.close()
         again.stream.stop()
-
-
-
-
-
-
-
-
 
 
 def test_a_stream_on_all_addresses_needs_a_key() -> None:

@@ -17,12 +17,7 @@ from cdpr_drivers.errors import BusError
         ("simbus:one", "simbus", "one", {}),
         ("socketcan:vcan0", "socketcan", "vcan0", {}),
         ("slcan:/dev/ttyACM0?bitrate=1000000", "slcan", "/dev/ttyACM0", {"bitrate": 1000000}),
-        (
-            "socketcand://host:29536/can0",
-            "socketcand",
-            "can0",
-            {"host": "host", "port": 29536},
-        ),
+        ("socketcand://host:29536/can0", "socketcand", "can0", {"host": "host", "port": 29536}),
         ("socketcand://[::1]:1/can0", "socketcand", "can0", {"host": "::1", "port": 1}),
         (
             "kvaser:0?bitrate=500000&accept_virtual=true&driver_mode=x",

@@ -14,14 +14,7 @@ from cdpr_drivers.canopen.boot import boot, boot_all
 from cdpr_drivers.cia402 import State
 from cdpr_drivers.errors import BootError
 from cdpr_profiles import DriveProfile
-from tests.drivers.axis_rig import (
-    DRIVE,
-    MASTER,
-    SETTINGS,
-    Rig,
-    open_network,
-    start_simulator,
-)
+from tests.drivers.axis_rig import DRIVE, MASTER, SETTINGS, Rig, open_network, start_simulator
 from tests.drivers.bus_log import logged
 
 

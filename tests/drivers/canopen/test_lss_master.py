@@ -48,11 +48,7 @@ def device(
     od.set_default(0x1018, 2, product)
     od.set_default(0x1018, 4, serial)
     return CanopenSlave(
-        od,
-        node_id,
-        SlaveApplication(),
-        store=ParameterStore(store),
-        lss_hides_others=hides_others,
+        od, node_id, SlaveApplication(), store=ParameterStore(store), lss_hides_others=hides_others
     )
 
 

@@ -70,10 +70,7 @@ def one(found: list[SdoEvent], step: Step) -> SdoEvent:
 
 
 VALUES = st.binary(min_size=1, max_size=40) | st.binary(min_size=880, max_size=900)
-overheard = settings(
-    max_examples=12,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+overheard = settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @overheard

@@ -17,12 +17,7 @@ class LoadCellRig:
     """`cdpr sim tension` and the physics board that it reads. `tell` causes and ends faults."""
 
     def __init__(
-        self,
-        sensors: str | Path,
-        folder: Path,
-        axes: int,
-        *options: str,
-        lockstep: bool = False,
+        self, sensors: str | Path, folder: Path, axes: int, *options: str, lockstep: bool = False
     ) -> None:
         self.board = PhysicsBoard.create(folder / "board", axes, lockstep=lockstep)
         self.time_s = 0.0

@@ -72,8 +72,6 @@ def test_the_contactor_closes_when_asked_and_opens_at_the_end(
     assert not io_device.coil(0)
 
 
-
-
 def test_the_emergency_stop_trips_until_it_is_acknowledged(
     io_device: SafetyIoProcess, winch: BoardAxis, tmp_path: Path
 ) -> None:
@@ -207,8 +205,6 @@ def test_a_contactor_without_feedback_is_detected(
         wait_until(lambda: not io_device.coil(0))
 
 
-
-
 def test_an_output_changed_by_another_client_is_detected(io_device: SafetyIoProcess) -> None:
     with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
@@ -217,8 +213,6 @@ def test_an_output_changed_by_another_client_is_detected(io_device: SafetyIoProc
         wait_until(io.alarm)
         assert "output 0 was set to 1 and reads 0" in io.alarm()
         io_device.break_(SafetyIoFault(0))
-
-
 
 
 def test_an_unexpected_error_in_a_poll_trips_and_power_is_cut_at_close(
@@ -311,9 +305,7 @@ def test_the_device_drops_its_outputs_when_the_master_falls_silent(
     link.close()
 
 
-def test_a_missing_silent_or_wrong_device_is_reported(
-    io_device: SafetyIoProcess,
-) -> None:
+def test_a_missing_silent_or_wrong_device_is_reported(io_device: SafetyIoProcess) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

@@ -273,9 +273,7 @@ def test_a_malformed_bus_name_is_rejected(name: str) -> None:
     hub.close()
 
 
-def test_the_hub_serves_nodes_on_a_real_interface_and_ends_with_it(
-    stub_node: type,
-) -> None:
+def test_the_hub_serves_nodes_on_a_real_interface_and_ends_with_it(stub_node: type) -> None:
     """A connected socket replaces the raw CAN socket. Both have one frame per packet."""
     node = stub_node(4, answers=(pack_frame(0x184, b"truth"),))
     hub = Hub([node], name="socketcan:can0")

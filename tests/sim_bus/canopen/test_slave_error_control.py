@@ -177,9 +177,7 @@ def test_ending_the_monitoring_clears_the_error(bench: Bench) -> None:
     assert bench.run_to(2.0) == []
 
 
-def test_emergencies_are_sent_once_and_kept_in_register_and_history(
-    bench: Bench,
-) -> None:
+def test_emergencies_are_sent_once_and_kept_in_register_and_history(bench: Bench) -> None:
     slave = bench.slave
     slave.emergency(0x2310, 0x02, b"\x34\x12xyz")
     slave.emergency(0x2310, 0x02)

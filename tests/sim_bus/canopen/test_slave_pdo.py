@@ -311,14 +311,7 @@ def test_sync_identifier_can_be_moved(running: Bench) -> None:
     assert 0x80 not in running.slave.accepts
 
 
-NUMBERS = {
-    0x6040: "H",
-    0x6060: "b",
-    0x6071: "h",
-    0x607A: "i",
-    0x60FF: "i",
-    0x6072: "H",
-}
+NUMBERS = {0x6040: "H", 0x6060: "b", 0x6071: "h", 0x607A: "i", 0x60FF: "i", 0x6072: "H"}
 
 
 @settings(max_examples=40)

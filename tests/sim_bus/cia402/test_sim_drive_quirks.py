@@ -23,8 +23,6 @@ def mnm() -> Rig:
     return rig
 
 
-
-
 def refusal(rig: Rig, index: int, value: int, sub: int = 0) -> int:
     with pytest.raises(SdoRefusedError) as caught:
         rig.write(index, value, sub)
@@ -51,10 +49,6 @@ def turn(rig: Rig, units: int, seconds: float = 0.012) -> tuple[float, float]:
     return sample[6], sample[5]
 
 
-
-
-
-
 def test_max_torque_and_slope_are_in_the_same_unit(mnm: Rig) -> None:
     assert mnm.read(0x6072) == 11_550
     mnm.write(0x6072, 400)
@@ -63,10 +57,6 @@ def test_max_torque_and_slope_are_in_the_same_unit(mnm: Rig) -> None:
     mnm.write(0x6087, 20_000)
     turn(mnm, 0, 0.2)
     assert turn(mnm, 300, 0.008)[0] == pytest.approx(0.16 * 1.04, rel=0.1)
-
-
-
-
 
 
 def test_a_mode_change_without_halt_is_ignored(mnm: Rig) -> None:
@@ -88,8 +78,6 @@ def test_the_mode_cannot_be_changed_while_enabled(eds: Path) -> None:
     assert refusal(rig, 0x6060, HM) == DEVICE_STATE
     rig.write(0x6040, 0x10F)
     assert refusal(rig, 0x6060, HM) == DEVICE_STATE
-
-
 
 
 @pytest.mark.parametrize("method", [17, 37, 3])

@@ -36,9 +36,7 @@ PATIENCES = ("CHECK_TPDO", "SWITCH_OP_MODE", "SWITCH_STATE_FINAL")
 def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
     name = f"third-party-{request.param}-{os.getpid()}"
     process = subprocess.Popen(
-        [*FORKED, SIMULATOR, name, request.param],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
+        [*FORKED, SIMULATOR, name, request.param], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert process.stdout is not None
     assert "ready" in json.loads(process.stdout.readline())

@@ -150,9 +150,7 @@ def test_steady_friction_follows_the_stribeck_curve(
 
 @settings(max_examples=25)
 @given(
-    torque=st.floats(-0.999, 0.999),
-    sigma0=st.floats(200.0, 5000.0),
-    asymmetry=st.floats(-0.5, 0.5),
+    torque=st.floats(-0.999, 0.999), sigma0=st.floats(200.0, 5000.0), asymmetry=st.floats(-0.5, 0.5)
 )
 def test_rotor_sticks_below_breakaway_torque_and_slips_above(
     torque: float, sigma0: float, asymmetry: float
@@ -308,9 +306,7 @@ def test_result_hardly_depends_on_the_cycle_time() -> None:
 
 
 @pytest.mark.parametrize("units", [100.0, -400.0])
-def test_torque_ripple_has_orders_6_and_12_per_electrical_turn(
-    units: float,
-) -> None:
+def test_torque_ripple_has_orders_6_and_12_per_electrical_turn(units: float) -> None:
     p = plant(cogging=(), ripple={"sixth": 0.03, "twelfth": 0.02, "phase_deg": 0.0})
     motor = Motor(p)
     motor.step(0.01, servo.TORQUE, units)
