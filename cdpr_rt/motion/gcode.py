@@ -392,15 +392,26 @@ class _Reader:
             value = self._value(words, i)
             if not state.relative:
                 target[i] = value + state.offset[i]
-            elif math.isfinite(target[i]):
-                target[i] += value
             else:
-                letter = self._letters[i]
-                raise _LineError(
-                    f"{letter}: a relative move before the position is known; "
-                    "give an absolute position (G90) first"
-                )
+                target[i] += value
         return target
+
+    def _start_at_zero(self, block: Block) -> None:
+        """Take the file's zero as the position before the first relative move."""
+        state = self._state
+        assumed = [
+            i
+            for i in range(self._k)
+            if math.isnan(state.here[i]) and (i < 2 or self._letters[i] in block.words)
+        ]
+        if not assumed:
+            return
+        state.here[assumed] = state.offset[assumed]
+        zeros = " ".join(f"{self._letters[i]}0" for i in assumed)
+        self._findings.notes.append(
+            f"line {block.line}: a relative move comes first; the path begins at {zeros}"
+        )
+        self._begin(block.line)
 
     def _target_in_room(self, words: dict[str, float]) -> FloatArray:
         if self._state.motion not in ("G0", "G1"):
@@ -442,12 +453,14 @@ class _Reader:
     # -- motion
 
     def _move(self, block: Block, words: dict[str, float], in_room: bool) -> None:
-        motion = self._state.motion
+        state, motion = self._state, self._state.motion
         if motion == "G80":
             raise _LineError("a position without a motion after G80; give G0 or G1 first")
         if motion in _CYCLES:
             self._drill(block, words)
             return
+        if state.relative and not in_room:
+            self._start_at_zero(block)
         target = self._target_in_room(words) if in_room else self._target(words)
         arc = self._arc(words, target) if motion in ("G2", "G3") else None
         if self._path is None and arc is not None:

@@ -39,6 +39,13 @@ def test_units_and_distance_modes_apply_to_the_lines_after_them():
     assert (path.moves[3].dwell_s, path.moves[4].waits) == (0.5, True)
 
 
+def test_a_file_that_begins_with_a_relative_move_starts_at_its_zero():
+    path = read("G91", "G1 X10 F600", "X0 Y5", "M2", where=PLANE, origin=(0.1, 0.2))
+    np.testing.assert_allclose(path.start[:2], [0.1, 0.2])
+    np.testing.assert_allclose([move.end[:2] for move in path.moves], [[0.11, 0.2], [0.11, 0.205]])
+    assert path.notices == ["line 2: a relative move comes first; the path begins at X0 Y0"]
+
+
 def test_the_path_begins_after_all_coordinates_were_named():
     path = read("G0 Z50", "G0 X1 Y2", "G1 X5 F100", "M30", origin=(0.1, 0.2, 0.3))
     np.testing.assert_allclose(path.start[:3], [0.101, 0.202, 0.35])
@@ -142,7 +149,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "M220 S50"], ROOM, r":2: M220: is not supported"),
         (["G0 X0 Y0 Z0", "(" * 5000], ROOM, r":2: the line is longer than 4096 characters"),
         (["G0 X0 Y0 Z0", "(open"], ROOM, r":2: a comment is not closed"),
-        (["G91 X5"], ROOM, r":1: X: a relative move before the position"),
+        (["G91 X5"], ROOM, r":2: Z is never given"),
         (["G0 X0 Y0", "Z5"], PLANE, r":2: Z: the robot has no such axis; --ignore Z drops it"),
         (["G0 X0 Y0", "G18"], PLANE, r":2: G18: the robot moves in a plane; use G17"),
         (["G0 X0 Y0 Z0", "G4 P-1"], ROOM, r":2: G4: allowed"),
