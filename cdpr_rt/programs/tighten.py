@@ -511,8 +511,9 @@ class TightenProgram(PlatformProgram):
             np.maximum(high_N, 0.0, out=high_N)
             return
         self._share += min(max(_STAGES[self._stage][1] - self._share, -step), step)
-        self._blend = min(self._blend + step, 1.0)
-        self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
+        if self._blend < 1.0:
+            self._blend = min(self._blend + step, 1.0)
+            self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
         np.multiply(self._pretension_N, self._share, out=high_N)
         if self._stage == 0:
             share = self._share / TAKE_UP_SHARE
