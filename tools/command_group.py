@@ -15,7 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 from typing_extensions import override
 
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.loading import loading_notice, without_collection
+from cdpr_tools.loading import without_collection
 
 ROBOT_VARIABLE = "CDPR_ROBOT"
 """Environment variable that names the robot if the command line names none."""
@@ -26,7 +26,7 @@ HARMLESS = frozenset({"Look", "Describe", "Simulate", "Machine"})
 @cache
 def load(module: str, name: str) -> Any:
     """Return the group or command `name` of a module of cdpr_tools.commands: its `app`."""
-    with loading_notice(), without_collection():
+    with without_collection():
         app = importlib.import_module(f"cdpr_tools.commands.{module}").app
     group = typer.main.get_group(app)
     command = group if group.name == name else group.commands[name]

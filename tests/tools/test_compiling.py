@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -35,7 +34,6 @@ def test_kernels_without_cache_are_compiled_and_reported_once(
 ) -> None:
     """The same machine code serves constants and variables."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
-    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)  # set by a command in this process
     script = tmp_path / "kernels.py"
     script.write_text(KERNELS)
     first, again = (
@@ -45,85 +43,6 @@ def test_kernels_without_cache_are_compiled_and_reported_once(
     assert first.stdout.split() == ["4.0", "1"]
     assert first.stderr.startswith(f"{NOTICE} the test once") and first.stderr.count("\n") == 1
     assert again.stdout.split()[0] == "4.0" and again.stderr == ""
-
-
-TWICE = """
-import subprocess, sys
-from cdpr_tools.compiling import announce_compiling
-
-announce_compiling()
-if len(sys.argv) == 1:
-    for _ in range(2):
-        subprocess.run([sys.executable, __file__, "child"], check=True)
-import logging
-logging.getLogger("cdpr.compiling").info("a kernel")
-"""
-
-
-def test_a_command_and_its_child_processes_report_compilation_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
-    script = tmp_path / "twice.py"
-    script.write_text(TWICE)
-    for _ in range(2):  # another command reports it again
-        done = subprocess.run(
-            [sys.executable, str(script)], capture_output=True, text=True, check=True
-        )
-        assert done.stderr.count(NOTICE) == 1
-
-
-LONG = """
-import logging, time
-from cdpr_tools import compiling
-
-compiling._EVERY_S = 0.5
-compiling.announce_compiling("the test")
-for _ in range(30):
-    logging.getLogger("cdpr.compiling").info("a kernel")
-    time.sleep(0.1)
-"""
-
-
-def test_a_long_compilation_is_reported_repeatedly(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
-    script = tmp_path / "long.py"
-    script.write_text(LONG)
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
-    first, *further = done.stderr.splitlines()
-    assert first == f"{NOTICE} the test once for this machine; this may take minutes ..."
-    assert further
-    for line in further:
-        assert re.fullmatch(rf"{NOTICE} the test continues: \d+ kernels so far \.\.\.", line)
-
-
-LISTENED = """
-import logging
-from cdpr_tools.compiling import compiling_notices_to, pass_on, announce_compiling
-
-heard = []
-announce_compiling("the test")
-with compiling_notices_to(heard.append):
-    for _ in range(2):
-        logging.getLogger("cdpr.compiling").info("a kernel")
-    pass_on("compiling the drives continues: 5 kernels so far ...\\n")
-logging.getLogger("cdpr.compiling").info("a kernel")
-print(*heard, sep="\\n")
-"""
-
-
-def test_a_listener_gets_each_kernel_and_forwarded_progress() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", LISTENED], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines() == [
-        f"{NOTICE} the test continues: 1 kernels so far",
-        f"{NOTICE} the test continues: 2 kernels so far",
-        f"{NOTICE} the drives continues: 5 kernels so far",
-    ]
-    assert f"{NOTICE} the drives continues: 5 kernels so far ...\n" in done.stderr
 
 
 TASKS = """

@@ -23,7 +23,7 @@ from cdpr_rt.refusal import CommandRefusal
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.command_group import ROBOT_VARIABLE
-from cdpr_tools.daemon.loop_file import LoopFile, launcher_does, launcher_loads
+from cdpr_tools.daemon.loop_file import LoopFile, launcher_loads, launcher_pid
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     find_launcher_files,
@@ -261,11 +261,6 @@ def answers(robot: str | None, unix: Path | None) -> bool:
     return any(map(_is_alive, find_sockets(robot) if unix is None else [unix]))
 
 
-def is_starting(robot: str) -> bool:
-    """Whether a daemon of the robot is starting or ending."""
-    return _start_stage(robot, None) is not None
-
-
 def live_sockets() -> list[Path]:
     """Return the sockets of all running daemons that this user may command."""
     return [path for path in find_sockets() if _is_alive(path)]
@@ -279,10 +274,8 @@ def _only_socket(robot: str | None) -> Path:
         whose = "" if robot is None else f" for {robot}"
         if robot is not None and robot == os.environ.get(ROBOT_VARIABLE):
             whose += f" (from {ROBOT_VARIABLE})"
-        doing = _start_stage(robot, None)
-        if doing is not None:
-            what = f"is still starting, {doing}" if doing else "is starting, or ending"
-            raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
+        if is_starting(robot):
+            raise NoDaemonError(f"the daemon{whose} is starting, or ending: it does not answer")
         others = found_instead(live_sockets())
         raise NoDaemonError(f"no daemon runs{whose}; `cdpr run ROBOT` starts one{others}")
     if robot is not None:  # this user's daemons before the system's
@@ -291,11 +284,10 @@ def _only_socket(robot: str | None) -> Path:
     raise BadInputError(f"{len(found)} daemons run: choose one by --robot ({names})")
 
 
-def _start_stage(robot: str | None, unix: Path | None) -> str | None:
-    """Return the present step of the first launcher of the robot or at the socket, or None."""
+def is_starting(robot: str | None, unix: Path | None = None) -> bool:
+    """Whether a daemon of the robot, of any robot, or at this socket is starting or ending."""
     marks = find_launcher_files(robot) if unix is None else [unix.with_suffix(LAUNCHER_SUFFIX)]
-    doing = next((doing for doing in map(launcher_does, marks) if doing is not None), None)
-    return "its program is loaded" if doing is None and launcher_loads(robot, unix) else doing
+    return any(launcher_pid(mark) is not None for mark in marks) or launcher_loads(robot, unix)
 
 
 def _is_alive(path: Path) -> bool:
@@ -344,7 +336,7 @@ def key_values(texts: list[str]) -> dict[str, Any]:
     return values
 
 
-# the first start on a machine compiles the control loop, which takes minutes if it is slow
+# if the installation did not compile the control loop, the first start does it, for minutes
 _START_S, _ASK_S, _TELL_S = 600.0, 0.2, 10.0
 
 
@@ -355,9 +347,9 @@ def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
     """
     waiting = _Waiting(out)
     while not answers(robot, unix):
-        if (doing := _start_stage(robot, unix)) is None:
+        if not is_starting(robot, unix):
             return  # and none is expected
-        waiting.go_on(doing or "its simulated drives and processes are starting")
+        waiting.go_on("its simulated drives and processes are starting")
 
 
 def await_start(daemon: Daemon, out: Output) -> None:
@@ -400,10 +392,7 @@ def _startup_stage(status: dict[str, Any], waited: bool) -> str:
     If this command has started the daemon, the start includes the check of the bus.
     """
     if status.get("state") == "starting":
-        notices = "; ".join(status.get("notices") or ())
-        return (
-            notices or "its control loop is loading (compiling, if it runs here for the first time)"
-        )
+        return "its control loop is loading"
     booting = ("unconfigured", "inactive") if waited else ("unconfigured",)
     if status.get("state") in booting and not status.get("reason", "none yet"):
         return "its drives are booting"

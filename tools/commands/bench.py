@@ -15,7 +15,6 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robot import Error as RobotError
 from cdpr_tools.commands.options import JsonOption, option
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError, raised_as
-from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 
 app = typer.Typer(
@@ -25,8 +24,7 @@ app = typer.Typer(
 
 def _run(bench: str, as_json: bool, **given: Any) -> None:
     """Run the benchmark of a module and show its figures."""
-    with loading_notice():
-        module = importlib.import_module(f"cdpr_tools.bench.{bench}")
+    module = importlib.import_module(f"cdpr_tools.bench.{bench}")
     out = Output(as_json)
     figures = module.measure(**given, out=out)
     out.say(*figures.lines())

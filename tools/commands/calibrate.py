@@ -16,7 +16,6 @@ from cdpr_tools.commands import options
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
-from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 from cdpr_tools.signals import HELD, stop_on_signals
 
@@ -557,8 +556,7 @@ def study(
     Computes table 3.1 and figures 3.7, 3.8, B.1 to B.6 and C.1 to C.6 of the thesis for one of our
     robots, on all cores or a cluster. --png draws NAME.png, NAME-B.png and NAME-C.png.
     """
-    with loading_notice():
-        from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     with out.progress("cases", float(len(studies.cases()))) as advance:

@@ -17,13 +17,7 @@ from cdpr_tools.client.refusals import in_typed_words
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.commands.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.number_options import (
-    is_number,
-    numbers,
-    numbers_command,
-    point_text,
-    read_point,
-)
+from cdpr_tools.number_options import is_number, numbers, numbers_command
 from cdpr_tools.output import Output
 
 _JOG_S: Final = 1.0
@@ -111,28 +105,6 @@ def _is_inside(position_m: Sequence[float], platform: dict[str, Any]) -> bool:
     """Whether a position is in the box of targets."""
     low, high = platform["workspace_min_m"], platform["workspace_max_m"]
     return all(a <= x <= b for a, x, b in zip(low, position_m, high, strict=True))
-
-
-def _meant_move(words: Sequence[str], relative: bool, daemon: Daemon) -> str:
-    """Return the command for a point that was typed in a wrong form; "" if it is unclear.
-
-    Omitted coordinates are the present ones, within the box of targets.
-    """
-    platform, text = daemon.get("/description")["platform"], " ".join(words)
-    names = _COORDINATES[len(platform["home_m"])]
-    meant = read_point(text, names)
-    if not meant:
-        return ""
-    relative = relative or any(f"d{name}" in text.lower() for name in names)
-    others = [0.0] * len(names)
-    if not relative:
-        progress = daemon.get("/status").get("program_progress") or {}
-        here_m = progress.get("position_m") or platform["home_m"]
-        low, high = platform["workspace_min_m"], platform["workspace_max_m"]
-        bounds = zip(low, here_m, high, strict=True)
-        others = [round(1e3 * min(max(a, x, key=float), b)) for a, x, b in bounds]
-    point = point_text(meant.get(*pair) for pair in zip(names, others, strict=True))
-    return f"`cdpr move {'--relative ' * relative}--to {point}`"
 
 
 app = typer.Typer()
@@ -228,18 +200,14 @@ def move(
     if to is not None or rotate is not None:
         if axes or cable:
             given = ", ".join([*(axes or []), *["--cable"] * cable])
-            text = f"--to, --rotate: not together with axes or --cable: {given}"
-            if to is not None and daemon.get("/description").get("platform"):
-                command = _meant_move([to, *(axes or [])], relative, daemon)
-                text = f"--to {to} {given}: type {command}" if command else text
-            raise BadInputError(text)
+            raise BadInputError(f"--to, --rotate: not together with axes or --cable: {given}")
         move = PlatformMove(to, rotate, relative, frame, speed)
         with in_typed_words("move", move.typed):
             run_to_end(daemon, out, "pose", move.arguments(daemon), arrived=True)
         return
     if frame is not ReferenceFrame.ROOM:
         raise BadInputError(f"--frame {frame}: allowed only with --to or --rotate")
-    goals = _goals(daemon, axes or [], cable, relative)
+    goals = _goals(daemon, axes or [], cable)
 
     def motion(robot: Robot) -> None:
         turn = robot.pay_out if cable else robot.turn_by if relative else robot.turn_to
@@ -260,40 +228,30 @@ def _step(daemon: Daemon, texts: Sequence[str]) -> PlatformMove | None:
     turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
     given = dict(text.partition("=")[::2] for text in texts)
     if given.keys().isdisjoint({*places, *turns} - set(_names(daemon))):
-        if meant := _meant_step(texts, places):
-            raise BadInputError(f"{' '.join(texts)}: name the direction: {meant}")
         return None
     for text in texts:
         name, _, value = text.partition("=")
         if name not in (*places, *turns) or not is_number(value) or given[name] != value:
             allowed = ", ".join([*(f"{x}=MM" for x in places), *(f"{x}=DEG" for x in turns)])
-            meant = _meant_step(texts, places)
-            raise BadInputError(f"{text}: allowed: {allowed}, each once{meant and f': {meant}'}")
+            raise BadInputError(f"{text}: allowed: {allowed}, each once")
     to, rotate = (" ".join(given.get(name, "0") for name in some) for some in (places, turns))
     return PlatformMove(to, rotate or None, True, ReferenceFrame.ROOM, None)
-
-
-def _meant_step(words: Sequence[str], names: Sequence[str]) -> str:
-    """Return the command for a step that was typed in a wrong form; "" if it is unclear."""
-    meant = read_point(" ".join(words), names)
-    step = " ".join(f"{name}={value:.6g}" for name, value in meant.items())
-    return step and f"`cdpr jog {step}`"
 
 
 def _names(daemon: Daemon) -> list[str]:
     return [str(axis["name"]) for axis in daemon.get("/status")["axes"]]
 
 
-def _goals(daemon: Daemon, axes: list[str], cable: bool, relative: bool) -> list[float]:
+def _goals(daemon: Daemon, axes: list[str], cable: bool) -> list[float]:
     """Return the axes' targets, rad or m, nan for axes that do not move; raises BadInputError."""
     if not axes:
         raise BadInputError(
             "nothing to move; allowed: AXIS=ANGLE..., or --to and --rotate for a platform"
         )
     if "pid" not in daemon.get("/description").get("programs", ["pid"]):
-        command = _meant_move(axes, relative, daemon) or "`cdpr move --to` with its position in mm"
         raise BadInputError(
-            f"{' '.join(axes)}: this robot moves its platform: {command}; `cdpr jog` turns a winch"
+            f"{' '.join(axes)}: this robot moves its platform: `cdpr move --to` with its position "
+            "in mm; `cdpr jog` turns a winch"
         )
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
     factor = 1e-3 if cable else math.radians(1.0)

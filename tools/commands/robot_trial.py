@@ -14,7 +14,6 @@ from cdpr_tools.commands import options
 from cdpr_tools.commands.options import argument, option
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.loading import loading_notice
 from cdpr_tools.output import Output
 from cdpr_tools.signals import interrupted_by_sigterm
 
@@ -72,8 +71,7 @@ def trial(
     The daemon's own loop runs over the simulated bus in lockstep, faster than real time. The exit
     status is 0 even if a figure misses its limit.
     """
-    with loading_notice():
-        from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
+    from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     if again:

@@ -8,7 +8,6 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -37,7 +36,6 @@ from cdpr_rt.state_file import make_private_folder
 from cdpr_tools.commands import options
 from cdpr_tools.commands.browser import open_page
 from cdpr_tools.commands.options import option
-from cdpr_tools.compiling import compiling_notices_to
 from cdpr_tools.composition.own_code import OwnCodeOptions
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
@@ -192,7 +190,7 @@ def run(
                 out.note(text)
         simulator = None
         if settings.own_simulator:
-            simulator = _simulator(profile, settings, plant, camera, out, lock.tell)
+            simulator = _simulator(profile, settings, plant, camera, out)
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator, open_it=open_it)
 
@@ -218,18 +216,11 @@ def _simulator(
     plant: Path | None,
     camera: Path | None,
     out: Output,
-    tell: Callable[[str], None],
 ) -> OwnSimulator:
-    """Start the robot's simulated drives, and report this with `tell` to the launcher's file."""
+    """Start the robot's simulated drives, and check the robot meanwhile."""
     out.note(f"starting simulated drives: {len(robot.axes)} ...")
-    check = partial(_note_doubts, robot, out)  # compiles kernels if none are stored yet
-    tell("simulated drives")
-    with compiling_notices_to(tell):
-        simulator = OwnSimulator(
-            robot.reference, settings.buses[0], plant, camera=camera, meanwhile=check
-        )
-    tell("")
-    return simulator
+    check = partial(_note_doubts, robot, out)
+    return OwnSimulator(robot.reference, settings.buses[0], plant, camera=camera, meanwhile=check)
 
 
 def _writable(folder: Path | None, asked: Path | None, out: Output) -> Path | None:

@@ -6,6 +6,7 @@ import json
 import os
 import select
 import subprocess
+import sys
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from typing_extensions import override
 
-from cdpr_tools.compiling import NOTICE, pass_on
+from cdpr_tools.compiling import NOTICE
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import end_by_stdin, module_command
 
@@ -71,18 +72,21 @@ class _OwnProcess:
             if errors in ready:
                 if not (text := os.read(errors.fileno(), 4096).decode(errors="replace")):
                     heard = [out]
-                output = _without_notices(output + text)
+                output += text
+                if text.startswith(NOTICE):
+                    print(text, end="", file=sys.stderr, flush=True)
             if out in ready:
                 if ready_line := os.read(out.fileno(), 4096):
                     return ready_line.decode()
                 break
         if self.process.poll() is None and time.monotonic() >= deadline:
             raise WorkFailedError(f"the simulator was not ready within {_START_TIMEOUT_S:g} s")
-        message = _without_notices(output + errors.read().decode(errors="replace"))
-        message = message.strip().removeprefix("cdpr: ")
+        output += errors.read().decode(errors="replace")
+        message = "\n".join(x for x in output.splitlines() if not x.startswith(NOTICE))
         kind = (
             BadInputError if self.process.wait() == BadInputError.exit_status else WorkFailedError
         )
+        message = message.strip().removeprefix("cdpr: ")
         raise kind(message or "the simulator ended before it was ready")
 
     @staticmethod
@@ -261,17 +265,6 @@ class OwnCamera(_OwnProcess):
     def __init__(self, socket: Path, board: Path, plant: Path | None) -> None:
         more = () if plant is None else ("--plant", str(plant))
         super().__init__("sim", "camera", str(socket), "--board", str(board), *more)
-
-
-def _without_notices(output: str) -> str:
-    """Return output other than notices about compiled kernels, which are forwarded line by line."""
-    kept = ""
-    for line in output.splitlines(keepends=True):
-        if line.startswith(NOTICE) and line.endswith("\n"):
-            pass_on(line)
-        else:
-            kept += line
-    return kept
 
 
 def _numbered(path: Path, number: int) -> Path:

@@ -172,9 +172,8 @@ def started(pid: int) -> int:
 _PROGRAMS: Final = ("cdpr", "cdpr_tools.cli")
 _RUNS: Final = ("run", "start")
 _RUNTIME_VARIABLE: Final = b"XDG_RUNTIME_DIR"
-_MOST_DOING: Final = 160
 _NAMED_WITHIN_S: Final = 0.5
-_MOST_LAUNCHER_BYTES: Final = 64 + _MOST_DOING
+_MOST_LAUNCHER_BYTES: Final = 64
 
 
 class LauncherLock:
@@ -188,9 +187,8 @@ class LauncherLock:
         self._path = socket.with_suffix(LAUNCHER_SUFFIX)
         with os_error_as(BadInputError, f"--socket {socket}: {self._path}: cannot be locked"):
             self.fd = self._locked(socket)
-            self._name = f"{os.getpid()} {started(os.getpid())}\n".encode()
             os.ftruncate(self.fd, 0)
-            os.pwrite(self.fd, self._name, 0)
+            os.pwrite(self.fd, f"{os.getpid()} {started(os.getpid())}\n".encode(), 0)
         self._remove_loop_file(socket)
 
     def _remove_loop_file(self, socket: Path) -> None:
@@ -241,12 +239,6 @@ class LauncherLock:
         except FileNotFoundError:
             return False
 
-    def tell(self, text: str) -> None:
-        """Show clients the launcher's present step, in up to 160 characters."""
-        words = text[:_MOST_DOING].ljust(_MOST_DOING).encode("ascii", "replace")
-        with suppress(OSError):  # in one write, so that the name stays intact
-            os.pwrite(self.fd, words, len(self._name))
-
     def __enter__(self) -> Self:
         return self
 
@@ -272,15 +264,6 @@ def _taken(socket: Path, pid: int | None) -> BadInputError:
     return BadInputError(
         f"--socket {socket}: a daemon already runs there{whose}; `cdpr stop` ends it"
     )
-
-
-def launcher_does(path: Path) -> str | None:
-    """Return the present step of the launcher that the file names, if it reports one.
-
-    None if the launcher does not run, or if the file is not trusted.
-    """
-    named = _named_launcher(path)
-    return None if named is None else named[1]
 
 
 def launcher_loads(robot: str | None, socket: Path | None) -> bool:
@@ -319,18 +302,14 @@ def _loads(process: Path, robot: str | None, socket: Path | None) -> bool:
 
 
 def launcher_pid(path: Path) -> int | None:
-    """Return the pid of the launcher that the file names; None as for `launcher_does`."""
-    named = _named_launcher(path)
-    return None if named is None else named[0]
+    """Return the pid of the launcher that the file names.
 
-
-def _named_launcher(path: Path) -> tuple[int, str] | None:
+    None if the launcher does not run, or if the file is not trusted.
+    """
     try:
         with os.fdopen(open_regular(path, links=False), "rb") as file:
-            name, _, doing = file.read(_MOST_LAUNCHER_BYTES).decode("ascii").partition("\n")
+            pid, since = map(int, file.read(_MOST_LAUNCHER_BYTES).split())
             trusted = is_trusted(path, os.fstat(file.fileno()).st_uid)
-        pid, since = map(int, name.split())
     except (OSError, ValueError, ProfileError):
         return None
-    runs = trusted and since > 0 and started(pid) == since
-    return (pid, brief(doing.strip())) if runs else None
+    return pid if trusted and since > 0 and started(pid) == since else None

@@ -27,7 +27,7 @@ from cdpr_rt.loop.stop_socket import STOP_SUFFIX, StopSocket
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.programs.path_store import PathStore, paths_folder
 from cdpr_rt.state_file import state_path
-from cdpr_tools.compiling import announce_compiling, compiling_notices_to
+from cdpr_tools.compiling import announce_compiling
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.daemon.child import POWER_UNCONFIRMED, end_with_launcher
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
@@ -58,8 +58,7 @@ def main() -> int:
                 robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True,
                 limits=limits,
             )  # fmt: skip
-        with compiling_notices_to(lambda text: block.write_status({"notices": [text]})):
-            parts = loop_parts(robot, limits, block, own=settings.own.load())
+        parts = loop_parts(robot, limits, block, own=settings.own.load())
         stops = _stop_socket(settings.socket.with_suffix(STOP_SUFFIX))
     except (ProfileError, DriverError, ControlError, BadInputError) as error:
         print(f"cdpr: {printable(str(error))}", file=sys.stderr)

@@ -225,7 +225,7 @@ def test_a_command_waits_for_a_starting_daemon(
             thread.join()
     told = capsys.readouterr().err
     assert asked == ["/status"] * 5 + ["/description"] and ended.value.code == 2
-    assert told.count("the daemon is still starting: its control loop is loading (") == 1
+    assert told.count("the daemon is still starting: its control loop is loading") == 1
 
 
 def test_a_user_without_a_name_can_send_commands(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -233,7 +233,6 @@ def test_a_step_takes_each_direction_once(
     [
         (["--to"], "requires an argument"),
         (["--to", "1", "2", "left=3"], "not together with axes"),
-        (["--to", "1", "2mm", "3"], "--to 1 2mm, 3: type `cdpr move --to 1 2 3`"),
         (["--frame", "platform", "left=3"], "--frame platform: allowed only with"),
         (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],
@@ -247,51 +246,6 @@ def test_invalid_input_ends_with_a_message(
     text = str(result.exception) if isinstance(result.exception, CommandError) else result.output
     assert message in text
     assert not told.posted
-
-
-@pytest.mark.parametrize(
-    ("words", "command"),
-    [
-        ("x=-200", "--to -200 1400"),  # y: the nearest value in the box of targets
-        ("x=-200 y=1500", "--to -200 1500"),
-        ("-200 1500 --speed 20", "--to -200 1500"),
-        ("to 200 -1500", "--to 200 -1500"),
-        ("--x -200 --y 1500", "--to -200 1500"),
-        ("--to x=-200 y=1500", "--to -200 1500"),
-        ("--to -200mm 1500mm", "--to -200 1500"),
-        ("--to -20cm 1.5m", "--to -200 1500"),
-        ("--to (-200, 1500)", "--to -200 1500"),
-        ("--to -200,1500", "--to -200 1500"),
-        ("--relative -10 0", "--relative --to -10 0"),
-        ("dy=5", "--relative --to 0 5"),
-    ],
-)
-def test_a_point_typed_in_another_way_is_answered_with_the_command(
-    monkeypatch: pytest.MonkeyPatch, words: str, command: str
-) -> None:
-    told = Told(PLANE, {"position_m": [0.0, 1.3]})
-    result = typed(monkeypatch, told, *words.split(" "))
-    assert isinstance(result.exception, BadInputError)
-    assert command in str(result.exception)
-    assert not told.posted
-
-
-@pytest.mark.parametrize("words", ["x=-200 x=3", "lower=20", "5", "1 2 3", "left=1 2 3"])
-def test_no_command_is_guessed_from_an_unclear_point(
-    monkeypatch: pytest.MonkeyPatch, words: str
-) -> None:
-    result = typed(monkeypatch, Told(PLANE), *words.split(" "))
-    assert "`cdpr move --to` with its position in mm" in str(result.exception)
-
-
-@pytest.mark.parametrize(
-    ("words", "step"), [("10 -20", "x=10 y=-20"), ("x 10", "x=10"), ("dy=5", "y=5")]
-)
-def test_a_step_typed_in_another_way_is_answered_with_the_command(
-    monkeypatch: pytest.MonkeyPatch, words: str, step: str
-) -> None:
-    result = typed(monkeypatch, Told(PLANE), *words.split(" "), command="jog")
-    assert f"`cdpr jog {step}`" in str(result.exception)
 
 
 def test_a_step_from_the_stand_is_rejected_with_the_way_into_the_workspace(
