@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -56,48 +55,18 @@ def test_cogging_profiles_with_tables_of_different_length_are_rejected(learnt: P
     assert "harmonic.table_Nm has 512 and 256 values; every axis needs the same number" in told
 
 
-def make_deep(path: Path) -> None:
-    path.write_text("a = " + "[" * 200_000)
-
-
-def make_long(path: Path) -> None:
-    path.write_text("a = " + "1" * 6000)
-
-
 def make_pipe(path: Path) -> None:
     path.unlink(missing_ok=True)
     os.mkfifo(path)
 
 
-def make_device(path: Path) -> None:
-    path.unlink(missing_ok=True)
-    path.symlink_to("/dev/zero")
-
-
-def make_huge(path: Path) -> None:
-    with path.open("wb") as file:
-        file.truncate(1 << 40)
-
-
-@pytest.mark.parametrize(
-    ("make", "told"),
-    [
-        (make_deep, "line 1: is nested too deeply; allowed: 16 levels"),
-        (make_long, "line 1: a number of 6000 digits; allowed: 99"),
-        (make_pipe, "is not a regular file; allowed: a file, or a link to one"),
-        (make_device, "is not a regular file; allowed: a file, or a link to one"),
-        (make_huge, "is too long; allowed: up to"),
-    ],
-)
-def test_each_command_rejects_an_invalid_input_file(
-    tmp_path: Path, learnt: Path, make: Callable[[Path], None], told: str
-) -> None:
+def test_each_command_rejects_an_invalid_input_file(tmp_path: Path, learnt: Path) -> None:
     robot, plant = tmp_path / "robot.toml", tmp_path / "plant.toml"
     profile = learnt / "lower" / "cogging-profile.json"
     asked = tmp_path / "trial"
     asked.mkdir()
     for path in (robot, plant, profile, asked / "trial.json"):
-        make(path)
+        make_pipe(path)
     for path, command in (
         (robot, ("run", robot, "--bus", "simbus:")),
         (robot, ("bus", "budget", robot)),
@@ -108,8 +77,7 @@ def test_each_command_rejects_an_invalid_input_file(
         (asked / "trial.json", ("robot", "trial", "planar-3", "line", "--again", "--out", asked)),
     ):
         answer = said(cdpr_here(*command))
-        assert str(path) in answer
-        assert told in answer
+        assert f"{path}: is not a regular file; allowed: a file, or a link to one" in answer
 
 
 @pytest.mark.parametrize("command", [("drive", "import"), ("log", "info"), ("bus", "replay")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from cdpr_tools import cli
 from cdpr_tools.command_group import load
 from cdpr_tools.commands import groups
+from cdpr_tools.loading import without_collection
 
 
 def _loaded(code: str) -> set[str]:
@@ -95,3 +97,10 @@ def test_each_module_of_a_command_or_process_can_be_loaded_first() -> None:
     codes = dict(line.split() for line in done.stdout.splitlines())
     assert {"cdpr_tools.commands.poses", "cdpr_tools.robots.workspace_border"} <= set(codes)
     assert set(codes.values()) == {"0"}, done.stderr
+
+
+def test_no_garbage_is_collected_while_modules_load() -> None:
+    with pytest.raises(ModuleNotFoundError), without_collection():
+        assert not gc.isenabled()
+        raise ModuleNotFoundError("a package")
+    assert gc.isenabled()

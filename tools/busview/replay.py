@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
+import resource
 import sys
 import time
-import zlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from struct import Struct
 
 import can
 
@@ -25,6 +24,7 @@ from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 
 _LOOK_S = 0.1
 _MOST_LINE = 4096
+_MOST_MEMORY = 1 << 29
 BLOCK = 200
 """Number of frames to show together; this speeds up long files."""
 _DISABLE_VOLTAGE = bytes.fromhex("2B40600000000000")
@@ -79,8 +79,6 @@ def _frames(path: Path) -> Iterator[LogEntry]:
             if path.suffix.lower() == ".gz":  # a compressed file may expand to any size
                 raise BadInputError(f"{path}: is compressed; unpack it first")
             os.close(open_regular(path))  # python-can would open a file of any kind
-            if path.suffix.lower() == ".blf":
-                _require_bounded_blf(path)
             yield from _python_can_frames(path)
     except ProfileError as error:
         raise BadInputError(str(error)) from None
@@ -90,78 +88,23 @@ def _frames(path: Path) -> Iterator[LogEntry]:
         raise BadInputError("standard input: is not text, so it is not a candump log") from error
 
 
-# python-can unpacks a container of a BLF file as a whole, and joins objects across containers.
-# These layouts are those of its reader: file header, header of an object, of a container.
-
-_FILE_HEADER, _OBJECT, _CONTAINER = Struct("<4sL136x"), Struct("<4sHHLL"), Struct("<H6xL4x")
-_CONTAINER_TYPE, _DEFLATED = 10, 2
-_MOST_HEADER, _MOST_CONTAINER, _MOST_OBJECT = 4096, 1 << 24, 1 << 20
-_CHUNK = 1 << 16
-
-
-def _require_bounded_blf(path: Path) -> None:
-    """Raise BadInputError for a BLF file with parts that are too large for python-can."""
-    objects = _ObjectSizes(path)
-    with path.open("rb") as file:
-        head = file.read(_FILE_HEADER.size)
-        if len(head) < _FILE_HEADER.size or not head.startswith(b"LOGG"):
-            return  # python-can reports the error
-        _require_size(path, "header", _FILE_HEADER.unpack(head)[1], _MOST_HEADER)
-        file.seek(_FILE_HEADER.unpack(head)[1])
-        while len(head := file.read(_OBJECT.size)) == _OBJECT.size:
-            _, _, _, size, kind = _OBJECT.unpack(head)
-            _require_size(path, "container", size, _MOST_CONTAINER)
-            data = file.read(size - _OBJECT.size)
-            file.seek(size % 4, os.SEEK_CUR)
-            if kind == _CONTAINER_TYPE and len(data) >= _CONTAINER.size:
-                method, packed = _CONTAINER.unpack_from(data)[0], data[_CONTAINER.size :]
-                for chunk in _unpacked(path, packed) if method == _DEFLATED else (packed,):
-                    objects.read(chunk)
-
-
-def _require_size(path: Path, what: str, size: int, most: int, least: int = _OBJECT.size) -> None:
-    if not least <= size <= most:
-        raise BadInputError(f"{path}: {what} of {size} bytes; allowed: {least} to {most}")
-
-
-def _unpacked(path: Path, packed: bytes) -> Iterator[bytes]:
-    """Yield the content of a container, chunk by chunk; raises BadInputError above its limit."""
-    inflater, unpacked = zlib.decompressobj(), 0
-    with suppress(zlib.error):  # python-can reports the error
-        while packed and not inflater.eof:
-            chunk = inflater.decompress(packed, _CHUNK)
-            packed, unpacked = inflater.unconsumed_tail, unpacked + len(chunk)
-            if unpacked > _MOST_CONTAINER:
-                raise BadInputError(
-                    f"{path}: an unpacked container has more than {_MOST_CONTAINER} bytes, "
-                    "too many to read"
-                )
-            yield chunk
-
-
-class _ObjectSizes:
-    """Follows the objects within containers; an object may continue in the next container."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._skip, self._tail = path, 0, b""
-
-    def read(self, chunk: bytes) -> None:
-        """Process the next bytes; raises BadInputError for an object that is too large."""
-        skipped = min(self._skip, len(chunk))
-        self._skip -= skipped
-        data, at = self._tail + chunk[skipped:], 0
-        while (found := data.find(b"LOBJ", at, at + 8)) >= 0 and found + _OBJECT.size <= len(data):
-            size = _OBJECT.unpack_from(data, found)[3]
-            _require_size(self._path, "object", size, _MOST_OBJECT)
-            at = found + size
-        self._skip += max(at - len(data), 0)
-        self._tail = data[at : at + _CHUNK]  # python-can rejects data that is not an object
+@contextmanager
+def _bounded_memory() -> Iterator[None]:
+    """Limit the memory that the block may take, because a packed file may unpack to any size."""
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + _MOST_MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
 def _python_can_frames(path: Path) -> Iterator[LogEntry]:
     """Yield the frames of a file in a format of python-can."""
     try:
-        with can.LogReader(path) as reader:
+        with _bounded_memory(), can.LogReader(path) as reader:
             for message in reader:
                 if not message.is_fd:
                     frame = Frame.unpack(message.timestamp, packet_of(message))
@@ -169,7 +112,8 @@ def _python_can_frames(path: Path) -> Iterator[LogEntry]:
     except OSError:
         raise
     except Exception as error:  # python-can's readers raise various errors for a broken file
-        raise BadInputError(f"{path}: python-can cannot read it: {error}") from error
+        reason = str(error) or type(error).__name__
+        raise BadInputError(f"{path}: python-can cannot read it: {reason}") from error
 
 
 class Pacer:

@@ -152,24 +152,17 @@ def test_replay_reads_logs_of_python_can(session: Session, tmp_path: Path) -> No
         )  # .blf has a resolution of a millisecond
 
 
-@pytest.mark.parametrize("bomb", ["container", "object"])
-def test_a_blf_file_that_unpacks_to_too_much_is_rejected(tmp_path: Path, bomb: str) -> None:
-    path, most = tmp_path / "bomb.blf", 1 << 24
+def test_a_blf_file_that_unpacks_to_too_much_is_rejected(tmp_path: Path) -> None:
+    path, size = tmp_path / "bomb.blf", 3 << 28
     with can.Logger(path) as logger:
         logger(can.Message(arbitration_id=0x123, data=b"\x01"))
     header = path.read_bytes()[:144]
-    # an object with the length of all the rest, or a container of zeros
-    content = struct.pack("<4sHHLL", b"LOBJ", 16, 1, most, 1).ljust(1 << 16)
-    packed = zlib.compress(content if bomb == "object" else bytes(most + 1))
-    container = struct.pack("<H6xL4x", 2, len(content)) + packed
+    packer, zeros = zlib.compressobj(1), bytes(1 << 20)
+    packed = b"".join(packer.compress(zeros) for _ in range(size >> 20)) + packer.flush()
+    container = struct.pack("<H6xL4x", 2, size) + packed
     start = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 16 + len(container), 10)
     path.write_bytes(header + start + container)
-    what = (
-        "an unpacked container has more than 16777216"
-        if bomb == "container"
-        else "object of 16777216"
-    )
-    assert f"bomb.blf: {what} bytes" in complaint("replay", path)
+    assert "bomb.blf: python-can cannot read it: " in complaint("replay", path)
 
 
 def test_raw_output_of_replay_is_a_log(session: Session) -> None:

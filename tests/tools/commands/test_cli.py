@@ -98,8 +98,9 @@ def test_stop_commands_end_their_help_with_the_comparison_of_the_page() -> None:
 
 
 def test_a_robot_is_named_by_argument_option_or_environment(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # without the daemons of this machine
     named = (("planar-3",), ("--robot", "planar-3"), ("--robot=planar-3",))
     told = [cdpr_here("bus", "budget", *words).stdout for words in named]
     assert "3 cables" in told[0]

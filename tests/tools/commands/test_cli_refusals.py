@@ -154,7 +154,6 @@ def test_commission_rejects_a_folder_with_other_files(tmp_path: Path) -> None:
         (("robot", "show", "planar-3", "--png", "a.jpg"), "--png a.jpg: allowed: a name that ends"),
         (("poses", "planar-3", "--png", "a.pdf"), "--png a.pdf: allowed: a name that ends in .png"),
         (("markers", "print", "0", "--out", "a.png"), "--out a.png: allowed: a name that ends in"),
-        (("doctor", "--report", "/nowhere/a"), "allowed: a file in an existing folder"),
         (("markers", "map", "/nowhere"), "/nowhere: is not a folder with images"),
         (("profiles", "show", "nothing-of-the-kind"), "cdpr profiles list"),
         *(

@@ -6,7 +6,6 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,9 @@ import pytest
 
 import cdpr_profiles
 from cdpr_drivers.cia402 import POWER_OFF, Mode, State, state_of
-from cdpr_drivers.errors import BusError, ConfigurationError, ModeRefusedError, RobotBootError
-from cdpr_profiles import Robot, load_robot
+from cdpr_drivers.errors import BusError, ModeRefusedError, RobotBootError
+from cdpr_profiles import load_robot
 from cdpr_rt.errors import ControlError, TripError
-from cdpr_tools.bench.soak import bus_counts, compare
 from cdpr_tools.composition.session import Session, open_robot
 from tests.tools.robot_rig import (
     OUT,
@@ -245,31 +243,6 @@ def test_a_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
             pytest.fail("the robot was opened without a drive")
 
 
-def test_drives_of_different_makes_run_together(tmp_path: Path):
-    """Torque units, signs, modes and PDO maps differ. The budget knows the frames of each."""
-    drives = ("generic-cia402", "mnm-profile-torque", "parker-compax3-canopen")
-    path = robot_file(tmp_path, [("a", 1), ("a", 2), ("b", 1)], drives=drives)
-    robot = load_robot(path)
-    with simulated(path) as url, open_robot(robot, [url], OUT) as opened:
-        opened.enable()
-        hold(opened, 0.3)
-        before = bus_counts(opened)
-        start = opened.device.feedback.position_rad.copy()
-        speeds = np.array([2.0, -3.0, 4.0])
-        hold(opened, 1.0, speeds)
-        moved = opened.device.feedback.position_rad - start
-        np.testing.assert_allclose(moved, 0.9 * speeds, atol=0.2)
-        after = bus_counts(opened)
-        for bus, commands, answers in (("a", 3, 3), ("b", 1, 1)):
-            verdict = compare(bus, opened, before[bus], after[bus])
-            assert verdict["lost"] == 0
-            cycles = after[bus]["cycles"] - before[bus]["cycles"]
-            expected = cycles * (1 + commands + answers)
-            assert verdict["frames_counted"] == pytest.approx(expected, abs=60)
-            assert verdict["frames_expected"] == pytest.approx(verdict["frames_counted"], abs=10)
-        opened.disable()
-
-
 @pytest.mark.alone
 def test_paced_buses_run_as_one_device(tmp_path: Path):
     axes = [(bus, node) for bus in ("a", "b") for node in (1, 2, 3, 4)]
@@ -294,12 +267,3 @@ def test_paced_and_lockstep_buses_together_are_rejected(tmp_path: Path):
         ]
         with pytest.raises(BusError, match="is paced, bus left is lockstep"):
             stack.enter_context(open_robot(robot, buses, OUT))
-
-
-def test_a_robot_that_does_not_fit_its_bus_is_rejected_before_opening():
-    fast: Robot = replace(EIGHT, sync_period_s=0.0009)
-    with (
-        pytest.raises(ConfigurationError, match=r"4 drives need 975 us .* has 900 us"),
-        open_robot(fast, ["simbus:nobody-has-opened-this"], OUT),
-    ):
-        pytest.fail("opened")

@@ -23,7 +23,7 @@ from cdpr_tools.client.client import NoDaemonError, ServiceRefusalError
 from cdpr_tools.client.motion import carry_out
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.commands import daemon_state, with_daemon
-from cdpr_tools.daemon.loop_file import LauncherLock, LoopFile, started
+from cdpr_tools.daemon.loop_file import LoopFile, started
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 
@@ -198,22 +198,6 @@ def test_a_loop_that_ends_before_its_service_is_a_successful_stop(
     ended = run(daemon, "stop")
     assert (ended.exit_code, daemon.asked) == (0, 1), ended.exception
     assert ended.output.splitlines()[-1] == "stopped, power off"
-
-
-@pytest.mark.long
-def test_a_hanging_launcher_is_reported_with_the_state_of_the_power(
-    run: Run, tmp_path: Path
-) -> None:
-    control = tmp_path / "control.sock"
-    daemon = Daemon(lambda asked: {"state": "dead", "reason": ENDED} if asked else {}, control)
-    with LauncherLock(control):
-        error = run(daemon, "stop").exception
-    assert isinstance(error, WorkFailedError)
-    pid = os.getpid()
-    assert str(error) == (
-        f"{ENDED}; its drives had been commanded to switch off; its launcher, process {pid}, does "
-        f"not respond: end it with `kill -9 {pid}`"
-    )
 
 
 class UnheldDaemon:

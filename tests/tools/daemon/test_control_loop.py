@@ -311,23 +311,6 @@ def test_a_silent_drive_is_booted_again_on_acknowledge(jogging: LoopRig) -> None
     assert drive_states(jogging.run(0.1)) == {State.OPERATION_ENABLED}
 
 
-def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, str]) -> None:
-    with simulated(lab[0]) as url, opened(lab[0], url) as rig:
-        rig.obeyed("enable", program="jog", wanted=JOG)
-        rig.run(0.5)
-        rig.rows()
-        with log_of(rig) as log:
-            rig.loop.request_stop()
-            rig.turn_until(lambda: rig.loop.ended)
-        velocity = rig.rows()["setpoint_velocity_rad_s"][:, 0]
-        assert velocity[0] == pytest.approx(2.0)
-        braking = np.abs(np.diff(velocity[: np.flatnonzero(velocity == 0.0)[0] + 1]))
-        slope = rig.loop.engine.programs[1]._model.acceleration_rad_s2[0]  # type: ignore[attr-defined]
-        assert np.max(braking) <= 1.001 * slope * PERIOD_S
-        assert rig.status["state"] == "unconfigured"
-        assert [word for _, word in controlwords(log, 1)][-1] & 0x0F == 0
-
-
 def test_arbitrary_commands_neither_crash_the_loop_nor_give_power(ready: LoopRig) -> None:
     @settings(
         max_examples=4,

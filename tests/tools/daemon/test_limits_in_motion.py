@@ -145,26 +145,6 @@ def test_a_runaway_motor_is_stopped_by_the_drives(ready: WildRig) -> None:
     assert np.abs(speed).max() < 5.0
 
 
-def test_torque_is_clamped_in_magnitude_and_rate(ready: WildRig) -> None:
-    rows = ready.go_wild(push(9.0))
-    clamped = rows[rows["reaction"] == Reaction.CLAMP]
-    assert set(clamped["limit"]) <= {Limit.TORQUE, Limit.TORQUE_RATE}
-    assert clamped.size > 0
-    assert (clamped["torque_asked_Nm"][:, 1] == 9.0).all()
-    assert np.abs(rows["torque_sent_Nm"]).max() <= 1.5
-    # 0.2 Nm per cycle, rounded to the drive's unit of 3 mNm
-    assert np.diff(clamped["torque_sent_Nm"][:, 1]).max() <= 0.2 + 3e-3
-
-
-@pytest.mark.parametrize("what", [math.nan, math.inf, -math.inf])
-def test_a_nan_or_infinite_torque_reaches_no_drive(ready: WildRig, what: float) -> None:
-    rows = ready.go_wild(push(what))
-    tripped = int(np.flatnonzero(rows["limit"] == Limit.NOT_FINITE)[0])
-    assert rows["reaction"][tripped] == Reaction.QUICK_STOP
-    assert not rows["torque_sent_Nm"].any()
-    assert "a finite number is required" in ready.status["reason"]
-
-
 @pytest.mark.parametrize("what", [1.6, -1.6, math.nan])
 def test_the_reaction_in_the_robots_file_is_executed(ready: WildRig, what: float) -> None:
     def jump(_k: int, feedback: AxisFeedback, setpoint: Setpoint, _torque: FloatArray) -> None:

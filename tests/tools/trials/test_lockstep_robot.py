@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drivers.axes.axis_group import AxisGroup
-from cdpr_drivers.errors import BusError
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.robot import Error, Refused
 from cdpr_rt.service.stream_packet import Standing, StreamSession
@@ -145,36 +143,3 @@ def test_cycles_in_one_call_send_the_same_frames_as_single_ones(
         assert robot.state is LoopState.FAULT
     (log,) = tmp_path.glob("frames*.log")
     assert frames_of_jog.setdefault("", log.read_bytes()) == log.read_bytes()
-
-
-def test_a_silent_drive_does_not_prevent_closing_two_buses():
-    with LockstepRobot("bench-8") as robot:
-        robot.enable()
-        robot.inject(axis=1, sub=6, value=65535)
-        robot.run(0.5)
-        begin_s = robot.machine.clock.now_s
-        left = robot.machine.close()
-        # one second of cycles, then SDO until its timeout
-        assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
-    assert left.startswith("node 2 (axis 2): does not confirm that its power stage is off")
-    assert "node 1" not in left
-
-
-def test_a_bus_that_fails_to_exchange_does_not_prevent_closing_the_others(monkeypatch):
-    usual = AxisGroup.sync
-    with LockstepRobot("bench-8") as robot:
-        robot.enable()
-        robot.inject(axis=1, sub=6, value=65535)
-        robot.run(0.5)
-        dropped_out = robot.machine.device.groups[1]
-
-        def sync(group: AxisGroup) -> None:
-            if group is dropped_out:
-                raise BusError("the bus lives, and is not exchanged")
-            usual(group)
-
-        monkeypatch.setattr(AxisGroup, "sync", sync)
-        begin_s = robot.machine.clock.now_s
-        left = robot.machine.close()
-        assert 1.0 < robot.machine.clock.now_s - begin_s < 10.0
-    assert "node 2 (axis 2): does not confirm that its power stage is off" in left
