@@ -72,7 +72,7 @@ class CommandRefusal:
         match self.code:
             case RefusalCode.NOT_IN_STATE:
                 allowed = " or ".join(arguments["allowed"])
-                return f"not in state {arguments['state']}; allowed in {allowed}"
+                return f"not allowed in state {arguments['state']}; allowed in {allowed}"
             case RefusalCode.OUT_OF_RANGE:
                 return "allowed: {numbers}{low:g} to {high:g}{unit}".format(**arguments)
             case RefusalCode.NOTHING_LEFT:

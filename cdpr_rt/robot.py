@@ -632,7 +632,7 @@ class Robot:
             self._backend.command("program", program, wanted)
         except (Refused, InvalidArgument) as refused:
             self._started = before
-            status = self._look()
+            status = self._backend.brief_status()  # not for `on_status`: nothing has started
             if not isinstance(refused, Refused):
                 raise
             if status["reacting"] != "none":

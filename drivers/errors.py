@@ -31,7 +31,7 @@ def abort_text(code: int) -> str:
     text = _MORE_ABORTS.get(code) or SdoAbortedError.CODES.get(code)
     if text is None:
         group = _ABORT_GROUPS.get(code >> 16)
-        text = f"{group}, of a kind that no standard defines" if group else "a code of no standard"
+        text = f"{group} (not a standard code)" if group else "not a standard code"
     elif text[1].islower():
         text = text[0].lower() + text[1:]
     return f"{text} ({code:08X}h)"

@@ -382,7 +382,8 @@ def _reach_faults(
 ) -> Iterator[tuple[str, str]]:
     """Yield anchor points off the body, and a centre of mass far off the platform.
 
-    Without a body, the platform is the box around its anchor points; a point has no such box.
+    Without a body, the platform is the box around its anchor points. If all anchor points are
+    equal, nothing is checked.
     """
     size, body, points = len(file.home_m), file.body, list(anchors)
     if body is not None and len(body.min_m) == len(body.max_m) == size:

@@ -142,6 +142,7 @@ moves the robot.
 GUESSES = {
     "goto": "this moves the robot: type `cdpr move --to X Y [Z]`",
     "home": "this moves the robot: `cdpr lower` puts the platform on its stand",
+    "path check": "type `cdpr path show FILE`",
     "move --by": "type `cdpr move --relative --to X Y [Z]`, in mm",
     "gui": "`cdpr page` prints the address of a running robot's page for a browser, and "
     "`cdpr run ROBOT --open` starts a robot and opens it",

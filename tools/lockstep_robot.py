@@ -380,7 +380,7 @@ class LockstepRobot:
         end_s = clock.now_s + within_s
         while not done():
             if clock.now_s > end_s:
-                raise Error(f"{what}: not within {within_s:g} s: {self.state_text()}")
+                raise Error(f"{what}: not complete after {within_s:g} s: {self.state_text()}")
             self.turn()
 
     # -- commands

@@ -358,7 +358,7 @@ def _judged(
 
 
 def _of_robot(file: CableGeometry, model: _ByLengths, null: _Score) -> list[tuple[float, str]]:
-    """Return faults of the robot's file that may be the cause instead, with cost and text."""
+    """Return cost and text of each fault of the robot's file that may be the cause instead."""
     size, rows, k = len(model.known), file.rows, file.coordinates
     each = np.eye(size)
     tried: list[tuple[str, FloatArray, float]] = []

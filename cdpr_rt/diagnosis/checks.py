@@ -58,7 +58,7 @@ def stand_findings(s: Subject) -> Iterator[Finding]:
     text = (
         f"value {s.model.high_N[i]:g}; the platform on its stand withstands a pull of only "
         f"{pulled_N[i]:.2g} N by {names}, but the friction of such winches is usually up to "
-        f"{needed_N[i]:.2g} N: tighten may find slack cables and end"
+        f"{needed_N[i]:.2g} N: tighten may fail because cables stay slack"
     )
     remedy = "winches with less friction, or a home where cables pull less against each other, help"
     for times in _TIMES:
@@ -66,7 +66,9 @@ def stand_findings(s: Subject) -> Iterator[Finding]:
         higher = replace(s.limits, tension_max_N=high_N, torque_Nm=torque_Nm)
         if (pretension_N(platform_model_of(s.robot, higher), torque_Nm) >= needed_N).all():
             most_Nm = float(np.max(high_N * s.arm_m))
-            remedy = f"enough: {np.max(high_N):.0f}, which is {most_Nm:.2g} Nm at the motor; or "
+            remedy = (
+                f"use {np.max(high_N):.0f} or more, which is {most_Nm:.2g} Nm at the motor; or "
+            )
             remedy += "winches with less friction"
             break
     yield Finding("limits.tension_max_N", f"{text}; {remedy}", impossible=False)
@@ -336,7 +338,7 @@ def _sagging(s: Subject) -> Iterator[Finding]:
         text = (
             f"value {statics.low_N[i]:g}; at the lowest planned tension the cable of "
             f"axes[{i}] sags so much that one more newton shortens it by {m_per_N[i]:.2g} "
-            f"m, and lengths do not determine the position well; enough: {enough_N:.2g}"
+            f"m, and lengths do not determine the position well; use {enough_N:.2g} or more"
         )
         yield Finding("limits.tension_min_N", text, impossible=False)
 

@@ -597,4 +597,4 @@ class TransitionRunner:
     def wait_until(self, done: Callable[[], bool], within_s: float, what: str) -> Steps:
         """Wait until `done`; raises RefusedError if that takes longer than `within_s`."""
         if not (yield from self.wait_up_to(within_s, done)):
-            raise RefusedError(f"{what}: not within {within_s:g} s")
+            raise RefusedError(f"{what}: not complete after {within_s:g} s")

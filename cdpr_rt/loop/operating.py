@@ -112,7 +112,7 @@ class Operator:
         while not done():
             self._refuse_when_stopped(what)
             if left <= 0:
-                raise NotInTimeError(f"{what}: not within {within_s:g} s")
+                raise NotInTimeError(f"{what}: not complete after {within_s:g} s")
             left -= 1
             self._turn()
 

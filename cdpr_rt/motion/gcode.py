@@ -487,8 +487,8 @@ class _Reader:
         turned = [letter for letter, one in zip(self._letters[k:], used, strict=True) if one]
         if len(turned) > 1:
             raise _LineError(
-                f"{' '.join(turned)}: the orientation depends on a machine's order of rotations; "
-                "allowed: one of A B C other than 0 at a time (way points take rotation_rad)"
+                f"{' '.join(turned)}: machines differ in the order of these rotations; allowed: "
+                "only one of A B C other than 0 at a time (or way points with rotation_rad)"
             )
         self._turns.update(turned)
 

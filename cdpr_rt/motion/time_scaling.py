@@ -78,7 +78,7 @@ class WrenchBounds(NamedTuple):
     """
 
     row: IntArray
-    """(N,)"""
+    """Row of `normals`, `lower` and `upper` for each node, (N,)."""
     normals: FloatArray
     """(t, f, d)"""
     lower: FloatArray

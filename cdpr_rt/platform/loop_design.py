@@ -156,7 +156,7 @@ class Mode(NamedTuple):
 
     @property
     def dies_down_s(self) -> float:
-        """Time after which 2 % of the amplitude are left."""
+        """Time after which the amplitude has fallen to 2 %."""
         rate = self.damping_ratio * math.tau * self.frequency_Hz
         return math.log(50.0) * math.sqrt(1.0 - self.damping_ratio**2) / rate
 

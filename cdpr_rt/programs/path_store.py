@@ -310,9 +310,9 @@ class StoredPlan:
     """Name of the path's file."""
     period_s: float
     samples: FloatArray
-    """(c, 3, d)"""
+    """Position, velocity and acceleration at each sample, (c, 3, d)."""
     along_m: FloatArray
-    """(c,)"""
+    """Distance along the path at each sample, (c,)."""
     line: NDArray[np.int64]
     """Lines of the path's file, (c,)."""
     waits_s: FloatArray

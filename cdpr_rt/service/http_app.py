@@ -278,7 +278,7 @@ _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
     401: {"model": models.Error, "description": "The key is missing or wrong"},
-    403: {"model": models.Error, "description": "The page or the name of another host"},
+    403: {"model": models.Error, "description": "Origin or Host names another host"},
     408: {"model": models.Error, "description": "The body arrived too slowly"},
     413: {"model": models.Error, "description": "The body is too long"},
     422: {"model": models.Error, "description": "Invalid key or value"},
@@ -469,7 +469,8 @@ def _add_reading(app: FastAPI, service: Service) -> None:
             int, Query(ge=0, le=2**53, description="Only events after this number.")
         ] = 0,
         most: Annotated[
-            int, Query(ge=1, le=512, description="At most this many, the newest.")
+            int,
+            Query(ge=1, le=512, description="Largest number of events; the newest are returned."),
         ] = 100,
     ) -> models.Events:
         """Events: states, reasons with their values, commands, who may move."""

@@ -287,7 +287,7 @@ class AxisGroup:
 
         On a bus that this process leads, the bus reports when all have answered. Otherwise the wait
         ends at `deadline_s` (CLOCK_MONOTONIC), by default so that a share of the period remains
-        for computing and sending. If another process leads the lockstep, it ends later.
+        for computing and sending. If another process leads the lockstep, the wait ends later.
         """
         reader = self._reader
         if isinstance(reader, SimulatedBus):

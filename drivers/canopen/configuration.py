@@ -36,7 +36,7 @@ class BootSettings:
     counts_per_turn: int | None = None
     """Encoder resolution of a drive that has no 608Fh."""
     torque_constant_Nm_per_Arms: float = 0.0
-    """Of the motor, for a drive whose torques are currents."""
+    """The motor's torque constant, for a drive that counts torques as currents."""
     mandatory: bool = True
     """Whether other drives may start only with this one (CiA 302-2, 1F81h bit 3)."""
 

@@ -60,7 +60,7 @@ class PdoView:
             entry = self.entries.get(position)
             if entry is None or entry & 7:
                 # without its length, the position of the values that follow is unknown
-                return values, f"entry {position} of the map not known: {_hex(data[start:])}"
+                return values, f"map entry {position} unknown: {_hex(data[start:])}"
             end = start + (entry & 0xFF) // 8
             if end > len(data):
                 return values, f"{len(data)} bytes, too few for the map"
@@ -69,7 +69,7 @@ class PdoView:
                 values.append(read_field(self.node, index, sub, data[start:end]))
             start = end
         if self.count is None and data:
-            return values, f"map not known: {_hex(data)}"
+            return values, f"map unknown: {_hex(data)}"
         if start < len(data):
             return values, f"{len(data) - start} bytes more than mapped: {_hex(data[start:])}"
         return values, ""
@@ -190,7 +190,7 @@ _LSS_REQUESTS = {
     0x17: "store the configuration",
     **{0x40 + i: f"select by {name} {{number:08X}}h" for i, name in enumerate(_LSS_IDENTITY)},
     **{0x46 + i: f"who has {name} {{number:08X}}h?" for i, name in enumerate(_LSS_RANGES)},
-    0x4C: "asks for devices without a node id",
+    0x4C: "who has no node id?",
     0x51: "fast scan: {scan}",
     **{command: f"report your {name}" for command, name in _LSS_INQUIRE.items()},
 }
@@ -218,7 +218,7 @@ def _lss_request(data: bytes) -> Reading:
         delay=data[1] + 256 * data[2],
         scan="start again"
         if data[5] == 0x80
-        else f"{part} from bit {data[5]} on as in {number:08X}h?",
+        else f"who has the bits 31 to {data[5]} of {number:08X}h in its {part}?",
     )
     return f"-> {text}", False
 
@@ -441,7 +441,7 @@ def _sdo_text(node: NodeView, event: SdoEvent, fields: tuple[DecodedValue, ...])
         Step.ASK_READ: f"read {what}{note}",
         Step.ASK_WRITE: f"write {what} = {value or size or 'a value to follow'}{note}",
         Step.ANNOUNCE: f"{what}: {size or 'a value'} to follow{note}",
-        Step.VALUE: f"{what} = {value or 'a value not seen as a whole'}",
+        Step.VALUE: f"{what} = {value or 'an incomplete value'}",
         Step.WRITTEN: f"written {what}{f' = {value}' if value else ''}",
         Step.SEGMENT: f"segment of {what}: {size}{note}",
         Step.CONTROL: f"{what}: {event.note}" if what else event.note,

@@ -558,9 +558,9 @@ class SafetyIo:
     def _refuse_in_use(self, state: IoState) -> None:
         if state.contactor_asked or any(state.brakes_asked.values()):
             raise SafetyIoError(
-                f"{self.name}: its outputs for contactor or brakes are already on: another "
-                "command uses it, or has died (then the device's own watchdog switches them "
-                "off; otherwise: cdpr io off)"
+                f"{self.name}: its outputs for contactor or brakes are already on: wait "
+                "until the command that uses it ends; if that command has died, wait for the "
+                "device's watchdog, or use cdpr io off"
             )
 
     def _refuse(self, obstacle: str) -> None:

@@ -140,8 +140,8 @@ def _test_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None
     if moved > check.allowed_m:
         _void_calibration(rail, clock, f"{rail.name} slipped by {moved * 1e3:.2f} mm on its brake")
         raise RailError(
-            f"{rail.name}: the applied brake does not hold: pushed with {check.torque_percent:g} % "
-            f"of the rated torque the carriage moved {moved * 1e3:.2f} mm "
+            f"{rail.name}: the applied brake does not hold: with {check.torque_percent:g} % of "
+            f"the rated torque, the carriage moved {moved * 1e3:.2f} mm "
             f"({check.allowed_m * 1e3:g} mm allowed)"
         )
     return moved
@@ -387,8 +387,9 @@ class ModbusRailAxis:
             self._client.write_registers(watchdog.timeout_register, [units])
         if self._is(self._map.status.enabled):
             raise RailError(
-                f"{self._rail.name}: the drive is already enabled: another command moves it, or "
-                "has died (then its watchdog switches it off; otherwise switch it off)"
+                f"{self._rail.name}: the drive is already enabled: wait until the command "
+                "that moves it ends; if that command has died, wait for the drive's watchdog, or "
+                "switch the drive off"
             )
 
     def close(self) -> None:

@@ -275,14 +275,16 @@ def slack_watch(
 
 def _bus_of(rail: RailProfile, bus: str | None) -> BusUrl:
     if bus is None:
-        raise ConfigurationError(f"--bus: {rail.name} is on a CAN bus; name it")
+        raise ConfigurationError(
+            f"--bus: is missing; {rail.name} is on a CAN bus, such as simbus:NAME"
+        )
     try:
         url = BusUrl.parse(bus)
     except BusError as error:
         raise ConfigurationError(str(error)) from error
     if url.starts_own_simulator:
         raise ConfigurationError(
-            "--bus simbus: has no rails; start one with `cdpr sim rail`, then give simbus:NAME"
+            "--bus simbus: simulates no rail; start one with `cdpr sim rail`, then give simbus:NAME"
         )
     return url
 

@@ -155,7 +155,7 @@ def _lacking_guards(node: str, report: BootReport) -> str:
     lacking = [name for name in report.absent if name.startswith(_GUARDS)]
     texts = []
     if lacking:
-        texts.append(f"lacks {', '.join(lacking)}: check what stops it if its master falls silent")
+        texts.append(f"lacks {', '.join(lacking)}: find out what stops it if it loses its master")
     if any(name.startswith(_TORQUE_LIMIT) for name in report.absent):
         texts.append(f"lacks {_TORQUE_LIMIT}: only the master limits its torque")
     return f"{node} {'; '.join(texts)}" if texts else ""

@@ -432,7 +432,7 @@ class Hub:
             raise SimulatorError(self._failure)
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when a turn has work."""
+        """Return a descriptor that is readable if there is work."""
         return self._watcher.fileno()
 
     def turn(self, wait_s: float | None) -> None:

@@ -214,7 +214,7 @@ def print_ready(ready: dict[str, Any]) -> None:
         return
     for line in _lines(ready):
         print(printable(line))
-    print("up; Ctrl-C ends it", flush=True)
+    print("running; Ctrl-C ends it", flush=True)
 
 
 def _lines(ready: dict[str, Any]) -> Iterator[str]:

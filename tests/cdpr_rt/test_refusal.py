@@ -18,7 +18,7 @@ FROM = {"why": "the lengths are not known", "allowed": ["home", "last"]}
 REFUSALS = [
     (
         CommandRefusal(RefusalCode.NOT_IN_STATE, "enable", arguments=STATE),
-        "enable: not in state fault; allowed in ready or active",
+        "enable: not allowed in state fault; allowed in ready or active",
     ),
     (
         CommandRefusal(RefusalCode.OUT_OF_RANGE, "jog", {"velocity_rad_s": 5.0}, RANGE),

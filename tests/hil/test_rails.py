@@ -156,7 +156,7 @@ def test_a_brake_that_does_not_hold_is_detected_before_the_move(rails: Rails, ki
     before = rails.position_m(kind)
     rails.wear_brake(kind)
     error = rails.refused(kind, before + 0.3)
-    assert "the applied brake does not hold: pushed with 10 % of the rated torque" in error
+    assert "the applied brake does not hold: with 10 % of the rated torque" in error
     assert abs(rails.position_m(kind) - before) < 0.05
     assert "slipped by" in rails.calibration()["why"]
 
@@ -223,7 +223,7 @@ def test_a_modbus_rail_obeys_the_safety_io_and_only_one_command(rails: Rails) ->
     slack = ("--cables-slack-checked", "--safety-io", rails.io_device.reference)
     command = rails.move("modbus", before + 0.5, *slack)
     await_motion(rails, "modbus", command, before + 0.005)
-    with pytest.raises(RailError, match="already enabled: another command moves it"):
+    with pytest.raises(RailError, match="already enabled: wait until the command"):
         ModbusRailAxis(load_rail(rails.modbus), CLOCK).open()
     rails.io_device.press()
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]

@@ -204,7 +204,7 @@ def test_commands_switch_lamps_and_brakes(lab: Lab) -> None:
     assert not lab.winch.brake_released
     with SafetyIo(lab.io_device.profile(), CLOCK) as other:
         other.energise()
-        with pytest.raises(WorkFailedError, match="another command uses it"):
+        with pytest.raises(WorkFailedError, match="wait until the command that uses it"):
             CliRunner().invoke(io_commands.app, [*brake, "--yes"], catch_exceptions=False)
         assert not other.alarm()
         assert lab.io("off")["contactor_closed"] is False

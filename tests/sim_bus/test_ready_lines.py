@@ -34,6 +34,6 @@ def test_output_on_a_terminal_is_readable_lines() -> None:
     shown = text.decode().splitlines()
     one = ["bus", "simbus:lab", "mode", "lockstep", "nodes", "1,", "2", "slcan", "/dev/pts/3"]
     assert " ".join(shown[:4]).split() == one
-    assert shown[4] == "up; Ctrl-C ends it"
+    assert shown[4] == "running; Ctrl-C ends it"
     assert shown[5].split() == ["robot", "r"]
     assert shown[10].split() == ["bus", "simbus:b"]

@@ -78,7 +78,7 @@ class Figures:
 
 
 def with_nothing_open(steps: Iterator[Work]) -> Way:
-    """Return a way whose calls need no open resources."""
+    """Return a way of measurement that opens no resources."""
     return lambda: nullcontext(steps)
 
 

@@ -87,7 +87,7 @@ def _ask_over_http(url: str, key_file: Path, do: str) -> None:
             daemon.post(f"/{do}")
         except WorkFailedError as error:
             # the loop's own answer: without power there is nothing to hold
-            if "not in state" not in str(error):
+            if "not allowed in state" not in str(error):
                 raise
 
 

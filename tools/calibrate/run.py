@@ -464,7 +464,7 @@ def _read_home(
     if not seen.markers:
         why = "was another dictionary printed, or are the sheets out of view?"
         if seen.mirrored:
-            why = f"{listed(seen.mirrored)} are mirror images: are all printed like that?"
+            why = f"{listed(seen.mirrored)} are mirror images: are all sheets printed mirrored?"
         raise WorkFailedError(
             f"at home the camera sees no marker of {setup.sheets.dictionary}: {why}"
         )

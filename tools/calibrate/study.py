@@ -80,7 +80,7 @@ class StudyCase:
     noise: FloatArray
     poses: int = _POSES
     share: float | None = None
-    """Share of the value in `BOUNDS` or `BIASES`."""
+    """Factor of the value in `BOUNDS` or `BIASES`."""
     bias: bool = False
 
 

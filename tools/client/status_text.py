@@ -77,7 +77,7 @@ _STAGES = {
     ("lower", "down"): "lowering the platform",
     ("lower", "fade"): "slackening the cables",
     ("path", "set out"): "braking before the path",
-    ("path", "to the path"): "moving to where the path continues",
+    ("path", "to the path"): "moving to the path",
     ("path", "path"): "following the path",
 }
 """Text for each stage of a program."""
@@ -293,6 +293,8 @@ def next_steps(status: dict[str, Any]) -> list[str]:
     if ready:
         steps.append(", ".join(ready))
     if last is not None and last["fallen"]:
+        if put_back := put_back_text(status):
+            steps.append(put_back)
         elsewhere = ""
         if all(axis.get("cable_length_m") is not None for axis in status["axes"]):
             elsewhere = "; if it stands upright elsewhere: `cdpr tighten --from lengths`"
@@ -300,8 +302,6 @@ def next_steps(status: dict[str, Any]) -> list[str]:
             "look at the platform, which has come down; if it stands at home, upright: "
             f"`cdpr tighten --from home`{elsewhere}"
         )
-        if put_back := put_back_text(status):
-            steps.append(put_back)
     return [f"next: {steps[0]}", *(f"      {step}" for step in steps[1:])]
 
 

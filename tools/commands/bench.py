@@ -63,8 +63,8 @@ def bus(
 ) -> None:
     """Measure frames per second and host cost per frame, beside plain python-can.
 
-    On simbus, on SocketCAN (vcan0, if there is one), through socketcand and through a serial
-    adapter, each with a node in a separate process that answers every frame.
+    It uses simbus, SocketCAN (vcan0, if there is one), socketcand and a serial adapter. On each, a
+    node in a separate process answers every frame.
     """
     _run("bus", as_json, exchanges=exchanges)
 
@@ -195,7 +195,7 @@ def stop(
 ) -> None:
     """Measure how soon the loop accepts a stop while four clients flood every interface.
 
-    On a separate simulated robot, without power; the flood stays on this machine.
+    It uses a separate simulated robot without power. The flood stays on this machine.
     """
     _run("stop", as_json, stops=stops, from_page=from_page)
 

@@ -226,13 +226,19 @@ def _step(daemon: Daemon, texts: Sequence[str]) -> PlatformMove | None:
         return None
     places = _COORDINATES[len(platform["home_m"])]
     turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
+    allowed = ", ".join([*(f"{x}=MM" for x in places), *(f"{x}=DEG" for x in turns)])
     given = dict(text.partition("=")[::2] for text in texts)
-    if given.keys().isdisjoint({*places, *turns} - set(_names(daemon))):
+    axes = _names(daemon)
+    if given.keys().isdisjoint({*places, *turns} - set(axes)):
+        if given.keys().isdisjoint(axes):
+            raise BadInputError(
+                f"{' '.join(texts)}: allowed: {allowed} for a step of the platform, or AXIS=DEG_S "
+                f"for the axes {', '.join(map(repr, axes))}"
+            )
         return None
     for text in texts:
         name, _, value = text.partition("=")
         if name not in (*places, *turns) or not is_number(value) or given[name] != value:
-            allowed = ", ".join([*(f"{x}=MM" for x in places), *(f"{x}=DEG" for x in turns)])
             raise BadInputError(f"{text}: allowed: {allowed}, each once")
     to, rotate = (" ".join(given.get(name, "0") for name in some) for some in (places, turns))
     return PlatformMove(to, rotate or None, True, ReferenceFrame.ROOM, None)

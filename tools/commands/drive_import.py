@@ -318,7 +318,7 @@ _CONSEQUENCES = {
     0x6007: "the reaction to the loss of the master is not set: manual",
     0x603F: "faults are reported without a code",
     0x605A: "the reaction to quick stop is not set: manual",
-    0x6072: "the drive does not limit the torque as the master does",
+    0x6072: "only the master limits the torque, not the drive",
     0x6076: "the motor's rated torque is taken from its profile",
     0x608F: "the encoder's resolution is taken from the winch's file",
 }

@@ -110,8 +110,8 @@ def brake(
         state = link.state()
         if state.contactor_asked or any(state.brakes_asked.values()):
             raise WorkFailedError(
-                f"{link.name}: its outputs for contactor or brakes are on: another command uses it "
-                "(or has died: cdpr io off)"
+                f"{link.name}: its outputs for contactor or brakes are on: wait until the command "
+                "that uses it ends; if that command has died, use cdpr io off"
             )
         require_consent(f"Then only its drive holds {axis}.", yes)
         link.set_watchdog()

@@ -30,10 +30,11 @@ app = typer.Typer(
 )
 
 _FilesArgument = Annotated[
-    list[Path],
+    list[Path] | None,
     argument(
-        "Recordings (*.mcap), a folder of them, or a session that `cdpr log list` names.",
-        metavar="FILE",
+        "Recordings (*.mcap), a folder of them, or a session that `cdpr log list` names; default: "
+        "the newest session.",
+        metavar="[FILE]",
     ),
 ]
 _FromOption = Annotated[
@@ -77,12 +78,19 @@ def list_command(
     out.result({"ok": True, "folder": where, "sessions": found})
 
 
+def _recordings(files: list[Path] | None) -> list[Path]:
+    """Return the recordings to read, by default the newest session of `cdpr run`."""
+    if files:
+        return files_of(files)
+    return list(sessions(files_of([default_recordings()])).values())[-1]
+
+
 @app.command()
-def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
+def info(files: _FilesArgument = None, as_json: JsonOption = False) -> None:
     """Summarise recordings: duration, events, gaps, and how they ended."""
     out = Output(as_json)
     results = []
-    for path in files_of(files):
+    for path in _recordings(files):
         results.append(summarise(path, out))
         out.say(*summary_lines(results[-1], _EVENTS_SHOWN))
     out.result({"ok": True, "recordings": results})
@@ -90,8 +98,8 @@ def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
 
 @app.command("export")
 def export_command(
-    files: _FilesArgument,
     target: Annotated[Path, option("A name ending in .csv or .parquet.", "--out")],
+    files: _FilesArgument = None,
     fields: Annotated[
         str | None, option("Only these fields, separated by commas; default: all.")
     ] = None,
@@ -103,7 +111,7 @@ def export_command(
     """Write the cycles of recordings, one after the other, into one table."""
     out = Output(as_json)
     check_target(target, overwrite)
-    selection = Selection(files, fields_of(fields), from_s, until_s)
+    selection = Selection(_recordings(files), fields_of(fields), from_s, until_s)
     with out.progress(target.name, selection.reading_s) as selection.advance:
         rows = export(selection, target)
     out.say(f"{target}: {rows} rows")
@@ -112,7 +120,7 @@ def export_command(
 
 @app.command()
 def plot(
-    files: _FilesArgument,
+    files: _FilesArgument = None,
     target: Annotated[
         Path | None,
         option(
@@ -134,7 +142,7 @@ def plot(
     If there are several sessions, it draws the newest.
     """
     out = Output(as_json)
-    found = sessions(files_of(files))
+    found = sessions(_recordings(files))
     name = list(found)[-1]
     if len(found) > 1 and not every:
         out.note(f"drawing {name}, the newest of {len(found)} sessions; --all draws all")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -23,7 +24,7 @@ from cdpr_rt.diagnosis.subject import Finding, Subject
 from cdpr_rt.model.calibration_state import mark_calibrated
 from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, argument, option
 from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
-from cdpr_tools.output import Output, TableText
+from cdpr_tools.output import Output, TableText, fold, width_of
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.calibration_text import calibration_lines
 from cdpr_tools.robots.caspr import read_caspr
@@ -309,7 +310,9 @@ class _Asker:
         self._origin = default.origin
         discard_typed_ahead()
         try:
-            text = str(typer.prompt(question.text, default=default.text, err=True))
+            text = str(
+                typer.prompt(_fitted(question.text, default), default=default.text, err=True)
+            )
         except typer.Abort:
             typer.echo(err=True)  # end the line of the question
             raise BadInputError(self.rejection or self._unfinished(key)) from None
@@ -329,7 +332,17 @@ class _Asker:
 
 def _say(*lines: str) -> None:
     for line in lines:
-        typer.echo(printable(line), err=True)
+        typer.echo(fold(printable(line), width_of(sys.stderr)), err=True)
+
+
+def _fitted(text: str, default: Default) -> str:
+    """Return a question, folded so that its default and an answer as long fit beside its end."""
+    width = width_of(sys.stderr)
+    return fold(text, width and max(width - 2 * len(default.text) - len(" []: "), _LEAST_QUESTION))
+
+
+_LEAST_QUESTION = 40
+"""Columns that a question gets on any terminal."""
 
 
 def _given(answers: Sequence[str]) -> dict[str, str]:

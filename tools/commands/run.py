@@ -93,15 +93,16 @@ def run(
     keep_days: Annotated[
         float | None,
         option(
-            "Remove recordings of this robot that are older; default in the user's folder: 30.",
+            "Remove recordings of this robot that are older, in days; default in the user's "
+            "folder: 30.",
             min=0.01,
         ),
     ] = None,
     keep_gb: Annotated[
         float | None,
         option(
-            "Remove the robot's oldest recordings above this total size; default in the user's "
-            "folder: 20.",
+            "Remove the robot's oldest recordings above this total size, in GB; default in the "
+            "user's folder: 20.",
             "--keep-gb",
             min=0.01,
         ),

@@ -62,7 +62,7 @@ class _OwnProcess:
     def await_ready(self) -> str:
         """Wait for the line of JSON with `ready` that the process prints, and return it.
 
-        Raises the BadInputError or WorkFailedError with which it ends instead.
+        If the process ends instead, raises BadInputError or WorkFailedError, as it did.
         """
         out, errors = self._pipe(self.process.stdout), self._pipe(self.process.stderr)
         deadline, output = time.monotonic() + _START_TIMEOUT_S, ""

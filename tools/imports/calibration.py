@@ -38,7 +38,7 @@ _GAP_S, _GAP_STEPS = 0.05, 3.0
 _FEWEST: Final = 3
 _CLOCK_STEP_S: Final = 0.02
 _LEAST_S: Final = 1.0
-"""Shorter recordings do not show whether the clocks agree."""
+"""Shortest recording that shows whether the clocks agree."""
 _ALIKE: Final = 0.8
 """Smallest correlation of rates at which another difference of the clocks is suggested."""
 _BETTER: Final = 0.2
@@ -287,7 +287,8 @@ def _rates(time: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
 def _target(model: PlatformModel, position_m: FloatArray) -> list[float]:
     """Return the coordinates (d,) where a search begins: at this position, turned as at home.
 
-    The fit keeps the rotation near its target. A measured one would verify itself.
+    The fit keeps the rotation near its target. So a measured rotation must not be the target: it
+    would verify itself.
     """
     vector = np.zeros(6)
     vector[:3] = position_m

@@ -105,7 +105,7 @@ def import_recording(
 
 
 def _empty(time: FloatArray, axes: int) -> Row:
-    """Return rows at these times with all quantities unknown, as an active robot's."""
+    """Return rows of an active robot at these times, with all quantities unknown."""
     rows = np.zeros(time.size, cycle_dtype(axes))
     for name in (*AXES, *POSES, "lateness_s", "exchange_s", "compute_s", "stream_age_s"):
         if rows.dtype[name].base.kind == "f":

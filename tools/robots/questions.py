@@ -24,9 +24,9 @@ KINDS = {
     "planar-3": "in a plane, x and y: 3 cables, and the platform turns freely",
     "planar-4": "in a plane, x, y and angle: 4 cables, one more than the directions",
     "point-4": "a point in space, x, y, z: 4 cables from above",
-    "suspended-6": "a platform in space on 6 cables from above, the fewest for its 6 directions",
-    "suspended-8": "a platform in space on 8 cables from above: larger workspace and angles",
-    "spatial-8": "a platform in space, 8 cables from above and below: fully constrained",
+    "suspended-6": "a platform in space on 6 cables from above, the fewest possible",
+    "suspended-8": "a platform in space on 8 cables from above: more room to turn",
+    "spatial-8": "a platform in space, 8 cables from above and below: stiffest",
 }
 """Description, and reason for the number of cables, by the kind's name."""
 SKETCH = r"""

@@ -254,8 +254,8 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
         f"tensions   hold the platform in {held} % of the box; targets are accepted in {taken} % "
-        f"of it: there, tensions in motion stay {kept:.0f} N from their limits, the reserve of the "
-        f"control{least}",
+        f"of it, because there tensions in motion keep the control's reserve of {kept:.0f} N to "
+        f"their limits{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
     lines.append(f"resonance  of rotors and platform through the cables at {lowest:.1f} Hz or more")
@@ -284,8 +284,9 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
     slowest, fastest = loop["slowest_Hz"], loop["fastest_Hz"]
     lines = [
         f"loop       has platform modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
-        f"{_STIFFNESS_OFF:.0%} softer or stiffer it has a gain margin of {loop['gain_margin']:.1f} "
-        f"and a phase margin of {math.degrees(loop['phase_margin_rad']):.0f} deg",
+        f"{100.0 * _STIFFNESS_OFF:.0f} % softer or stiffer it has a gain margin of "
+        f"{loop['gain_margin']:.1f} and a phase margin of "
+        f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
         f"           least damped oscillation: {loop['least_damped_Hz']:.1f} Hz, damping "
         f"ratio {loop['least_damping_ratio']:.2g}",
     ]

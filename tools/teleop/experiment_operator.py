@@ -93,7 +93,7 @@ class Station:
     """Devices of the operator in addition to a stylus; the thesis' system had neither."""
 
     clutch: bool = True
-    """A button that disconnects the hand from the robot, pressed before looking and confirming."""
+    """Whether a button disconnects hand and robot; it is pressed before looking and confirming."""
     steady: bool = True
     """Whether the hand's position is filtered before it is sent, see `PositionFilter`."""
 
@@ -269,7 +269,7 @@ class TargetConfirmation:
     begun_s: float
     pressed_s: float
     looked_s: tuple[float, float]
-    """When the first and the last of the pictures judged were taken."""
+    """Times at which the first and the last judged picture were taken."""
     tries: int
     """Number of movements towards this target."""
 

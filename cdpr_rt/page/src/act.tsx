@@ -113,7 +113,7 @@ function Key() {
 
 const FAULTS: [string, string][] = [
   ["cut-cable", "Cut the cable"], ["slip", "Let the cable slip"], ["drive-fault", "Fault in the drive"],
-  ["encoder-jump", "Encoder jumps"], ["silence", "Drive falls silent"],
+  ["encoder-jump", "Encoder jumps"], ["silence", "Drive sends nothing"],
 ];
 
 /** Break a simulated robot, and mend it. */

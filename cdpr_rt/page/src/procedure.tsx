@@ -55,7 +55,7 @@ export function Progress({ job, curves = false }: { job: Job; curves?: boolean }
         {job.running && <button onClick={end}>{job.ending ? "Remove the power now" : "Cancel"}</button>}
       </div>
       <p class="begun"><strong>{sentence(job.what)}</strong> <span class="quiet">by {job.client === clientName() ? "this page" : job.client}</span></p>
-      {job.running && <p class="quiet">{job.ending ? `It ends: ${job.ending}.` : "Keep this page open: the procedure ends if the page is closed or falls silent."}</p>}
+      {job.running && <p class="quiet">{job.ending ? `It ends: ${job.ending}.` : "Keep this page open: the procedure ends if the page is closed or does not respond."}</p>}
       {job.running && !job.steps.length && <p>{sentence(job.lines.at(-1) ?? "starting …")}</p>}
       {!job.running && <Ending job={job} />}
       {job.steps.length > 0 && (

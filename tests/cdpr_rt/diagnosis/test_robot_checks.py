@@ -91,7 +91,7 @@ def test_sagging_cables_are_reported_with_a_sufficient_tension(low_N: float, hig
     assert bool(told) == (slope > 0.01) == (low_N < 20.0)
     if told:
         assert f"{slope:.2g} m, and" in told[0]
-        enough_N = float(told[0].split("enough: ")[1])
+        enough_N = float(told[0].split("use ")[1].split()[0])
         better = hall(enough_N, high_N + enough_N)
         assert not any(f.key == "limits.tension_min_N" for f in diagnose(better))
 

@@ -38,7 +38,7 @@ def test_tension_bounds_below_friction_are_reported_with_sufficient_ones(
     (finding,) = tightening_findings(name, high_N)
     assert (finding.key, finding.impossible) == ("limits.tension_max_N", False)
     assert "the friction of such winches is usually up to 7.6 N" in finding.text
-    enough = re.search(r"enough: (\d+),", finding.text)
+    enough = re.search(r"use (\d+) or more,", finding.text)
     assert enough is not None
     assert tightening_findings(name, float(enough[1])) == []
 

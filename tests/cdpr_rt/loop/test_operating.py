@@ -236,7 +236,7 @@ def test_waiting_ends_by_its_condition_or_after_its_time_in_cycles() -> None:
     with powered() as rig:
         rig.operator.wait(lambda: rig.cycle >= 30, 1.0, "the index")
         assert rig.cycle == 30
-        with pytest.raises(TripError, match=r"the index: not within 0\.1 s"):
+        with pytest.raises(TripError, match=r"the index: not complete after 0\.1 s"):
             rig.operator.wait(lambda: False, 0.1, "the index")
         assert rig.cycle == 130
 

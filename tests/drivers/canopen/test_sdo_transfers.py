@@ -55,8 +55,8 @@ def test_data_of_any_length_are_read_as_written(network: CanNetwork) -> None:
         (0x05040005, "out of memory"),
         (0x06040042, "PDO length exceeded"),
         (0x08000022, "present device state"),
-        (0x06090099, "value error, of a kind that no standard defines"),
-        (0xDEADBEEF, "a code of no standard"),
+        (0x06090099, "value error (not a standard code)"),
+        (0xDEADBEEF, "not a standard code"),
     ],
 )
 def test_abort_codes_are_reported_as_text_and_as_a_number(

@@ -170,7 +170,7 @@ def test_a_pdo_that_does_not_fit_its_map_is_reported() -> None:
 
 def test_pdos_without_a_profile_are_shown_as_bytes() -> None:
     record = Decoder().decode(Frame(0.0, 0x395, b"\x12\x34"))
-    assert (record.kind, record.node_id, record.text) == ("TPDO3", 0x15, "map not known: 12 34")
+    assert (record.kind, record.node_id, record.text) == ("TPDO3", 0x15, "map unknown: 12 34")
     assert not record.problem
 
 

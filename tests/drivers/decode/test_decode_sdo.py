@@ -164,7 +164,7 @@ def test_ratings_and_pdo_maps_read_by_sdo_are_used_for_decoding(
     drive = KnownNode(WINCH.drive.model_copy(update={"tpdos": (), "rpdos": ()}))
     decoder = Decoder(others=drive)
     feedback = Frame(0.0, 0x181, bytes.fromhex("3706 00080000 E803"))
-    assert "map not known" in decoder.decode(feedback).text
+    assert "map unknown" in decoder.decode(feedback).text
     for message in overhear():
         decoder.decode(Frame(0.0, message.arbitration_id, bytes(message.data)))
     assert decoder.decode(feedback).text == (

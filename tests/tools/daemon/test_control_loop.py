@@ -337,7 +337,7 @@ def test_arbitrary_commands_neither_crash_the_loop_nor_give_power(ready: LoopRig
 
 def test_a_rejection_has_a_code_and_figures(ready: LoopRig) -> None:
     answer = ready.command("program", program="jog", wanted=JOG)
-    assert answer["text"] == "jog: not in state ready; allowed in active"
+    assert answer["text"] == "jog: not allowed in state ready; allowed in active"
     assert answer["refusal"] == {
         "code": "not_in_state",
         "command": "jog",

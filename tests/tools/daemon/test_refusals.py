@@ -42,8 +42,8 @@ def test_rejections_give_allowed_values_as_typed() -> None:
     states = {"state": "ready", "allowed": ["active"]}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
     text = text_of(refusal, "resume", instead="cdpr move --to")
-    assert (
-        text == "resume: not in state ready; allowed in active; `cdpr enable` switches the power on"
+    assert text == (
+        "resume: not allowed in state ready; allowed in active; `cdpr enable` switches the power on"
     )
     sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
     refusal = CommandRefusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
@@ -95,7 +95,7 @@ def test_the_proposed_action_depends_on_the_state(
     states = {"state": state, "allowed": allowed}
     refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
     text = str(DaemonRefusalError.of(refusal))
-    assert text == f"jog: not in state {state}; allowed in {' or '.join(allowed)}{remedy}"
+    assert text == f"jog: not allowed in state {state}; allowed in {' or '.join(allowed)}{remedy}"
     # the text of another rejection gets none
     assert text_of(
         CommandRefusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog"

@@ -145,9 +145,9 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
             [
                 "repair the cable; if it was injected: `cdpr sim fault bench mend`",
                 "`cdpr enable`",
+                "`cdpr sim fault bench put-back` carries the platform back to its start pose",
                 "look at the platform, which has come down; if it stands at home, upright: "
                 "`cdpr tighten --from home`",
-                "`cdpr sim fault bench put-back` carries the platform back to its start pose",
             ],
         ),
     ],

@@ -14,6 +14,7 @@ from matplotlib.image import imread
 from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_tools.daemon.paths import default_recordings
 from cdpr_tools.output import Output
 from cdpr_tools.recordings.picture import FIELDS, end_while_active, faults_of
 from cdpr_tools.recordings.selection import Selection
@@ -187,3 +188,20 @@ def test_a_truncated_recording_is_reported_unless_another_file_continues_it(
     assert "while the robot was active" not in live
     shutil.copy(path, path.with_name(path.name.replace("-001", "-002")))
     assert "while the robot was active" not in shown(path)
+
+
+def test_without_a_file_the_newest_session_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    folder = default_recordings()
+    folder.mkdir(parents=True)
+    path = record(tmp_path, active(0), axes=LEFT_RIGHT, programs=["hold"])
+    older, newer = (folder / f"bench-2026010{day}T120000Z-001.mcap" for day in (1, 2))
+    shutil.copy(path, newer)
+    shutil.copy(path, older)
+    result = cdpr_here("log", "info")
+    assert result.returncode == 0
+    assert newer.name in result.stdout and older.name not in result.stdout
+    assert cdpr_here("log", "plot").returncode == 0
+    assert newer.with_suffix(".png").exists()

@@ -65,9 +65,9 @@ def test_a_file_of_any_name_gets_a_name_that_the_daemon_accepts(tmp_path: Path) 
     [
         (
             {"state": "ready"},
-            "not in state ready; allowed in active; `cdpr enable` switches the power on",
+            "not allowed in state ready; allowed in active; `cdpr enable` switches the power on",
         ),
-        ({"state": "fault"}, "not in state fault; .* `cdpr ack` acknowledges it"),
+        ({"state": "fault"}, "not allowed in state fault; .* `cdpr ack` acknowledges it"),
         ({"state": "active", "program_progress": {"tight": False}}, "`cdpr tighten` first"),
     ],
 )

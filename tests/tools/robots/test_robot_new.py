@@ -7,6 +7,8 @@ import math
 import os
 import pty
 import re
+import subprocess
+import sys
 import threading
 from functools import cache
 from itertools import combinations
@@ -300,6 +302,29 @@ def test_unanswered_questions_write_no_file(tmp_path: Path) -> None:
     again = f"to continue: cdpr robot new {path} --set kind=planar-4 --set 'name=My wall'"
     assert again in done.stderr
     assert "Traceback" not in done.stderr and not path.exists()
+
+
+def test_questions_and_defaults_are_folded_to_the_width_of_the_terminal(tmp_path: Path) -> None:
+    person, terminal = pty.openpty()
+    with os.fdopen(terminal, "w") as shown:
+        subprocess.run(
+            [sys.executable, "-m", "cdpr_tools.cli", "robot", "new", str(tmp_path / "mine.toml")],
+            input="suspended-6\n" + "\n" * 20,
+            stderr=shown,
+            env=os.environ | {"COLUMNS": "60"},
+            text=True,
+            timeout=120.0,
+            check=False,
+        )
+        text = os.read(person, 1 << 16).decode()
+    os.close(person)
+    asked = (
+        text[text.index("Kind of robot") : text.index("cdpr: no answer")]
+        .replace("]:", "]:\n")
+        .splitlines()
+    )
+    assert len(asked) > 20
+    assert [line for line in asked if len(line) > 60] == []
 
 
 def test_typed_ahead_lines_answer_no_question(tmp_path: Path) -> None:

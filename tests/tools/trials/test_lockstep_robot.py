@@ -86,7 +86,7 @@ def test_a_rejected_command_raises_an_error_and_changes_nothing(robot):
     with pytest.raises(Refused, match="workspace"):
         robot.program("pose", position_m=[9.0, HEIGHT])
     assert robot.state is LoopState.ACTIVE
-    with pytest.raises(Error, match=r"the impossible: not within 0\.1 s: active"):
+    with pytest.raises(Error, match=r"the impossible: not complete after 0\.1 s: active"):
         robot.until(lambda: False, 0.1, "the impossible")
 
 
