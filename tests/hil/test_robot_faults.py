@@ -21,7 +21,7 @@ from cdpr_rt.diagnosis.predictions import slips
 from cdpr_rt.diagnosis.subject import Subject
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.robot import Error, Refused
-from cdpr_tools.lockstep_robot import LockstepRobot, StreamSender
+from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.truth import read_pose_log
 from tests.local_robot import local_robot
 from tests.profiles.test_geometry_calibration import calibration
@@ -31,7 +31,6 @@ UPPER_LEFT, UPPER_RIGHT, LOWER = range(3)
 HIGH = (0.1, 1.65)
 G_m_s2 = 9.80665
 TENSION_MAX_N = 150.0
-ACCELERATION_m_s2 = 2.0
 
 
 def aloft(robot: LockstepRobot, **tighten: str) -> None:
@@ -352,54 +351,6 @@ def test_drives_that_are_all_silent_for_too_many_cycles_lower_the_platform(
     assert -truth.read()["velocity_m_s"][:, 1].min() < 0.45
 
 
-def test_a_target_outside_the_workspace_is_rejected_without_motion(hanging: LockstepRobot) -> None:
-    truth = Truth(hanging)
-    for position, named in (
-        ([0.0, 5.0], "y 5000 mm; allowed: 1400 to 2400 mm, the workspace"),
-        ([math.nan, 1.8], r"position_m\[0\]: value nan"),
-        ([-0.7, 1.8], "x -700 mm; allowed: -600 to 600 mm, the workspace"),
-    ):
-        with pytest.raises(Error, match=named):
-            hanging.program("pose", position_m=position)
-    hanging.run(0.3)
-    speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
-    assert speeds.max() < 0.02
-    assert hanging.loop.engine.program.name == "pose"
-
-
-def lead(robot: LockstepRobot, hand: StreamSender, places: list[list[float]]) -> Any:
-    """Send a position every 20 ms. Return the rows of all cycles meanwhile."""
-    rows = []
-    for place in places:
-        robot.stream.take(hand.packet(robot.now_s, place))
-        rows.append(robot.run(0.02))
-    return np.concatenate(rows)
-
-
-def test_a_jump_of_the_hand_by_a_metre_causes_no_step(hanging: LockstepRobot) -> None:
-    hanging.program("pose", stream=True)
-    hand = hanging.stream.sender()
-    lead(hanging, hand, [[0.0, 0.0, 0.0]] * 20)
-    truth = Truth(hanging)
-    rows = lead(hanging, hand, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]] * 15)
-    steps = np.diff(rows["pose_setpoint"][:, :2], n=2, axis=0) / hanging.period_s**2
-    assert np.abs(steps).max() < 1.01 * ACCELERATION_m_s2
-    speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
-    assert speeds.max() < 0.75
-    assert hanging.state is LoopState.ACTIVE
-
-
-def test_set_points_with_nan_are_not_followed(hanging: LockstepRobot) -> None:
-    hanging.program("pose", stream=True)
-    hand = hanging.stream.sender()
-    lead(hanging, hand, [[0.0, 0.0, 0.0]] * 20)
-    truth = Truth(hanging)
-    lead(hanging, hand, [[math.nan, 0.0, 0.0], [0.0, math.inf, 0.0]] * 15)
-    assert np.linalg.norm(truth.read()["velocity_m_s"], axis=1).max() < 0.02
-    assert np.isfinite(hanging.row["pose_setpoint"][:2]).all()
-    assert hanging.state is LoopState.ACTIVE
-
-
 def test_the_platform_is_held_when_the_hand_disappears_in_motion(hanging: LockstepRobot) -> None:
     hanging.program("pose", position_m=[-0.4, 2.1], speed_m_s=0.2)
     hanging.run(0.5)
@@ -418,25 +369,6 @@ def test_the_platform_is_held_when_the_hand_disappears_in_motion(hanging: Lockst
     hanging.right.take("trial")
     hanging.carry_out("pose", 30.0, position_m=list(HIGH))
     assert hanging.loop.life.reason == ""
-
-
-def test_a_paused_motion_resumes_to_its_target(hanging: LockstepRobot) -> None:
-    target = [-0.3, 1.6]
-    hanging.program("pose", position_m=target)
-    hanging.run(0.4)
-    hanging.command("hold")
-    hanging.run(0.5)
-    away_m = np.abs(hanging.truth()["position_m"][:2] - target).max()
-    assert away_m > 0.05
-    hanging.carry_out("pose", 20.0, resume=True)
-    hanging.run(0.5)
-    assert hanging.truth()["position_m"][:2] == pytest.approx(target, abs=0.01)
-
-
-def test_program_idle_is_rejected_while_the_platform_is_suspended(hanging: LockstepRobot) -> None:
-    with pytest.raises(Error, match="the platform hangs on its cables; lower it first"):
-        hanging.program("idle")
-    assert hanging.loop.engine.program.name == "pose"
 
 
 def test_cable_lengths_that_contradict_the_index_are_neither_used_nor_stored(

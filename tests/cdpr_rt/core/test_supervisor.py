@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_profiles.robot_limits import Limit
-from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.fault import Fault, fault_record
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.core.supervisor import Limits, Supervisor
@@ -131,19 +129,3 @@ def test_arbitrary_torques_never_exceed_the_limits(
             json.dumps(fault_record(fault, ()), allow_nan=False) for fault in supervisor.findings()
         )
         last[:] = cycle.torque
-
-
-def test_checking_keeps_no_allocated_memory() -> None:
-    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    estimator = Estimator(2, PERIOD_S)
-    estimator.update(cycle.feedback)
-    cycle.check(supervisor)
-    tracemalloc.start()
-    before = tracemalloc.get_traced_memory()[0]
-    for k in range(10_000):
-        cycle.torque[:] = 3.0 * (k % 2)
-        estimator.update(cycle.feedback)
-        cycle.check(supervisor)
-    left = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    assert left < 1000

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_rt.control.winch_speed_loop import SPARE_m, WinchSpeedLoop
+from cdpr_rt.control.winch_speed_loop import SPARE_m
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.model.robot_arrays import limits_of, winches_of
@@ -21,7 +21,6 @@ from cdpr_rt.programs.tighten import index_path
 from tests.cdpr_rt.programs.standing_robot import (
     PERIOD_S,
     ROBOT,
-    CABLE_m,
     HOME_m,
     Standing,
     STIFFNESS_N_m,
@@ -160,23 +159,6 @@ def test_positions_need_tight_cables_and_idle_needs_loose_ones(robot: Standing):
     robot.run(0.1)  # each axis holds its own cable now, as after a stop with brakes
     with pytest.raises(ProgramError, match="may hang on them; lower it first"):
         idle.check({})
-
-
-def test_a_winch_that_pays_out_ignores_a_jump_of_its_encoder():
-    winches, feedback, torque = (
-        WinchSpeedLoop(np.full(3, 1e-4), CABLE_m, PERIOD_S),
-        AxisFeedback(3),
-        np.zeros(3),
-    )
-    winches.high_N[:] = 100.0
-    torque[:] = -20.0 * CABLE_m
-    winches.begin(feedback, np.zeros(3), torque)
-    winches.update(feedback, torque)
-    for jump in (1.5, -1.5):
-        feedback.position_rad[1] += jump
-        for _ in range(30):
-            winches.update(feedback, torque)
-            assert winches.tension_N == pytest.approx(20.0)
 
 
 def test_a_cable_that_goes_slack_ends_tightening(robot: Standing):
@@ -518,12 +500,3 @@ def test_a_cable_that_pulls_but_does_not_stand_still_is_named(
     told = robot.until_done(1.0)["trouble"]
     assert told.startswith("no further cable became tight within 0 s: ")
     assert told.endswith(" N and keeps moving")
-
-
-@pytest.mark.parametrize("stage", ["slack", "pull"])
-def test_checking_which_cables_are_tight_allocates_no_arrays(robot: Standing, stage: str) -> None:
-    until(robot, stage)
-    look = robot.program._not_tight  # type: ignore[attr-defined]
-    first = look()
-    assert first.size == 3
-    assert look() is first

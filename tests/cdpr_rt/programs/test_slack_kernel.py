@@ -134,15 +134,6 @@ def test_a_heavy_cable_does_not_run_out_when_its_turn_begins() -> None:
     assert 0.85 * hangs_N < cable.winch.high_N[0] < 0.95 * hangs_N
 
 
-def test_cables_are_reeled_in_one_after_the_other() -> None:
-    phase = np.array([kernel.PAID_OUT, kernel.NEXT, kernel.NEXT])
-    assert kernel._whose_turn(phase) == -1
-    phase[0] = kernel.WAITING
-    assert kernel._whose_turn(phase) == 1
-    phase[1] = kernel.REELED_IN
-    assert kernel._whose_turn(phase) == -1
-
-
 def test_a_tight_cable_is_released_immediately() -> None:
     cable = reeled_in(0.03, 9.0)
     assert cable.winch.high_N[0] > 0.0

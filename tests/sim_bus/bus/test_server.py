@@ -169,34 +169,6 @@ def test_third_party_clients_exchange_frames_with_the_bus(
     assert frames(bus, len(sent)) == expected
 
 
-@pytest.mark.parametrize("gateway", ["stock_slcan", "stock_socketcand"])
-def test_sync_is_delivered_and_answered_in_order(
-    gateway: str, request: pytest.FixtureRequest
-) -> None:
-    """SYNC has no data, which needs two spaces in socketcand."""
-    bus = request.getfixturevalue(gateway)
-    for _ in range(20):
-        bus.send(can.Message(arbitration_id=0x080, is_extended_id=False))
-        assert [frame[0] for frame in frames(bus, 2)] == [0x181, 0x281]
-
-
-def test_each_client_receives_the_frames_of_the_others(
-    stock_slcan: can.BusABC, stock_socketcand: can.BusABC, member: can.BusABC
-) -> None:
-    everyone = [stock_slcan, stock_socketcand, member]
-    for k, sender in enumerate(everyone):
-        sender.send(can.Message(arbitration_id=0x300 + k, data=[k], is_extended_id=False))
-        for bus in everyone:
-            if bus is not sender:
-                assert frames(bus, 1) == [(0x300 + k, False, False, bytes([k]))]
-        assert sender.recv(0.05) is None
-
-
-def test_the_adapter_reports_version_and_serial_number(stock_slcan: Any) -> None:
-    assert stock_slcan.get_version(None) == (10, 13)
-    assert stock_slcan.get_serial_number(None) == "SIM1"
-
-
 def test_the_serial_line_takes_the_time_of_its_characters(line: serial.Serial) -> None:
     """At 1 Mbaud a character takes 10 us. 200 frames of 23 characters and answers take 46 ms."""
     line.write(b"S8\rO\r")
@@ -363,11 +335,6 @@ def test_a_signal_ends_the_simulator_properly(
     assert (plain.ready["bus"], plain.ready["pid"]) == (f"simbus:{NAME}-4", plain.process.pid)
     assert (plain.ready["mode"], plain.ready["nodes"]) == ("paced", [1])
     plain.process.send_signal(number)
-    assert plain.stop() == (0, "")
-    assert trace.read_text() == "closed"
-
-
-def test_the_simulator_ends_when_its_standard_input_closes(plain: Simulator, trace: Path) -> None:
     assert plain.stop() == (0, "")
     assert trace.read_text() == "closed"
 

@@ -179,30 +179,6 @@ def test_a_second_fault_does_not_hide_the_first() -> None:
     assert rig.read(0x603F) == 0xFF01
 
 
-def test_power_is_off_in_fault() -> None:
-    rig = Rig()
-    rig.enable(10)
-    rig.torque = 300
-    rig.cycles(50)
-    rig.write(0x2F00, 0xFF01, 1)
-    rig.cycles(800)
-    assert rig.actual_torque == 0
-    assert abs(rig.truth[1]) < 1e-3
-
-
-def test_an_encoder_jump_offsets_the_position_permanently() -> None:
-    rig = Rig()
-    rig.enable(10)
-    rig.cycles(50)
-    before = rig.position
-    rig.write(0x2F00, 700, 11)
-    rig.cycles(50)
-    assert rig.position - before == pytest.approx(700, abs=3)
-    rig.write(0x2F00, -700, 11)
-    rig.cycles(50)
-    assert rig.position == pytest.approx(before, abs=3)
-
-
 def test_only_a_drive_with_a_cable_accepts_cut_and_slip() -> None:
     bare = Rig()
     for sub in (12, 13):
