@@ -112,13 +112,8 @@ def test_a_controller_runs_to_its_end_and_then_holds(quick: RealDaemon, terminal
             "middle=3: allowed: AXIS=deg/s of 'left', 'right', such as left=20",
         ),
         (("jog", "left=fast"), 2, "'fast' is not a number of deg/s"),
-        (("jog", "left=nan"), 2, "left=nan: allowed: a finite number"),
-        (("jog", "left=1e6"), 2, "left=1e+06: allowed: -4749 to 4749 deg/s"),
         (("move", "left=1e9"), 2, "left=1e+09: allowed: -573000 to 573000 deg"),
-        (("move", "left=1", "--speed", "1e6"), 2, "--speed 1e+06: allowed: 0.00573 to 4749 deg/s"),
         (("controller", "waltz"), 1, "program: 'waltz'; allowed: idle, hold"),
-        (("controller", "sweep", "legs"), 2, "legs: allowed: KEY=VALUE"),
-        (("controller", "sweep", "legs=NaN"), 2, "legs: value NaN; allowed: a finite number"),
         (("controller", "sweep", "legs=[1"), 2, "legs: is not valid JSON"),
     ],
 )
@@ -189,11 +184,3 @@ def wrong_key(folder: Path) -> Path:
     path.write_text("the key of another robot")
     path.chmod(0o600)
     return path
-
-
-def test_error_without_a_daemon_tells_how_to_start_one(tmp_path: Path, terminal: Terminal) -> None:
-    status, _, err = terminal.run("hold", "--socket", str(tmp_path / "none.sock"))
-    assert status == 1
-    assert "cdpr run ROBOT" in err
-    assert terminal.run("hold", "--url", "http://127.0.0.1:9")[0] == 1
-    assert terminal.run("hold", "--url", "ftp://127.0.0.1:9")[0] == 2

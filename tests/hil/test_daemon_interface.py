@@ -1,4 +1,4 @@
-"""The control interface of a real daemon: fuzzing, floods, and failures of service or client."""
+"""The control interface of a real daemon: fuzzing, and failures of service or client."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -17,15 +16,12 @@ import pytest
 import requests
 import schemathesis
 from daemon_lab import RIGHT, angles, events, happened, holding, running, with_key, with_power
-from daemon_rig import PATIENCE_S, RealDaemon, alive, until
+from daemon_rig import PATIENCE_S, RealDaemon, until
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
 from requests.adapters import HTTPAdapter
 
 MORE_MEMORY_B = 40e6
-MOST_MEMORY_B, LEVEL_B = 100e6, 2e6
-"""Memory that a flood may take in total, and in two seconds after levelling off."""
 
 
 @pytest.fixture(scope="module")
@@ -158,44 +154,6 @@ def test_no_request_without_the_right_to_move_moves_an_active_robot(
     assert resident_B(service) - memory_B < MORE_MEMORY_B
 
 
-KEYS = ["velocity_rad_s", "cable_velocity_m_s", "timeout_s", "position_rad", "distance_rad"]
-KEYS += ["cable_m", "speed_rad_s", "legs", "scale", "nonsense"]
-WISHES = st.dictionaries(
-    st.sampled_from(KEYS),
-    st.one_of(
-        st.lists(
-            st.none() | st.floats(-20.0, 20.0) | st.floats(-1e9, 1e9) | st.just(True), max_size=3
-        ),
-        st.floats(-1e9, 1e9),
-        st.integers(-5, 5),
-        st.text("aN1-", max_size=4),
-        st.none(),
-    ),
-    max_size=3,
-)
-
-
-def test_no_request_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
-    loop = quick.children()["loop"]
-    programs = quick.http.get("/description").json()["programs"]
-    seen: set[int] = set()
-
-    with holding(quick) as headers:
-
-        @settings(max_examples=80)
-        @given(program=st.sampled_from([*programs, "none"]), first=WISHES, then=WISHES)
-        def wish(program: str, first: dict[str, Any], then: dict[str, Any]) -> None:
-            if program == "idle":  # idle has zero torque, so that a suspended load would fall
-                return
-            body = {"program": program, "wanted": first}
-            seen.add(quick.http.post("/program", json=body, headers=headers).status_code)
-            seen.add(quick.http.post("/set", json={"wanted": then}, headers=headers).status_code)
-
-        wish()
-    assert seen == {200, 409}
-    assert alive(loop)
-
-
 def test_the_axis_stops_after_a_jogging_client_was_killed(quick: RealDaemon) -> None:
     command = [
         sys.executable,
@@ -216,25 +174,6 @@ def test_the_axis_stops_after_a_jogging_client_was_killed(quick: RealDaemon) -> 
     until(lambda: quick.status()["program"] == "hold")
     until(lambda: abs(quick.status()["axes"][0]["velocity_rad_s"]) < 0.1)
     assert "nobody holds the right to move" in quick.status()["reason"]
-
-
-def test_a_stalled_service_loses_the_right_to_move_and_a_dead_one_is_restarted(
-    quick: RealDaemon,
-) -> None:
-    with holding(quick, 4.0) as headers:
-        wanted = {"velocity_rad_s": [0.5, 0.0], "timeout_s": 2.0}
-        body = {"program": "jog", "wanted": wanted}
-        assert quick.http.post("/program", json=body, headers=headers).status_code == 200
-        service = quick.children()["service"]
-        os.kill(service, signal.SIGSTOP)
-        time.sleep(5.0)
-        os.kill(service, signal.SIGCONT)
-        until(lambda: quick.status().get("program") == "hold")
-    os.kill(service, signal.SIGKILL)
-    until(lambda: quick.children().get("service") not in (None, service))
-    status = quick.wait_for("active")
-    assert status["program"] == "hold"
-    assert status["control"]["held"] is False
 
 
 def test_a_restarted_service_does_not_need_the_key_file(daemon: RealDaemon, url: str) -> None:

@@ -18,7 +18,6 @@ from cdpr_profiles import load_robot
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import load_data
 from cdpr_rt.calibration.residuals import encoder_lengths
-from cdpr_rt.model.calibration_state import mark_not_calibrated
 from tests.slower_robot import slower_robot
 
 
@@ -114,27 +113,6 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
     again = cdpr("lower", *daemon.at)
     assert again.returncode == 0 and "lowering the platform" not in again.stderr
     assert "paying out the cables; a platform" in again.stderr
-
-
-def test_a_platform_does_not_move_after_a_rail_moved_until_marked_calibrated(
-    daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert daemon.robot is not None
-    monkeypatch.setenv("XDG_STATE_HOME", str(daemon.robot.parent))
-    mark_not_calibrated("planar-3", "rail 2 was moved from 0.1000 m")
-    # the drives have had power since then, so that the rails cannot have moved
-    status, why = refused(daemon, "move", "--to", "0", "1600")
-    assert (status, "run tighten first" in why) == (1, True)
-    for _ in range(2):
-        output_of(daemon, "disable")
-        output_of(daemon, "enable")
-        status, why = refused(daemon, "move", "--to", "0", "1600")
-        if "run tighten first" in why:
-            return
-        assert "'planar-3' is not calibrated since 20" in why and "rail 2 was moved" in why
-        assert any("is not calibrated" in notice for notice in daemon.status()["notices"])
-        assert cdpr("robot", "mark-calibrated", daemon.robot, "--why", "laser").returncode == 0
-    pytest.fail(why)
 
 
 def test_a_platform_turns_to_the_given_angle(turning: RealDaemon) -> None:

@@ -28,16 +28,6 @@ class Manager:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(str(path))
 
-    def heard(self, seconds: float) -> list[str]:
-        """Return all notifications until `seconds` pass without one."""
-        told: list[str] = []
-        self._socket.settimeout(seconds)
-        while True:
-            try:
-                told += self._socket.recv(4096).decode().split("\n")
-            except TimeoutError:
-                return told
-
     def hears(self, wanted: str) -> None:
         """Wait for a notification."""
         self._socket.settimeout(60.0)
@@ -89,46 +79,6 @@ def test_other_processes_leave_the_core_of_a_real_time_loop_alone(tmp_path: Path
                 assert not taken & os.sched_getaffinity(int(task.name))
     finally:
         daemon.end()
-
-
-def test_a_second_daemon_for_the_same_robot_is_rejected(daemon: RealDaemon) -> None:
-    second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *daemon.at)
-    assert second.returncode == 2
-    assert "a daemon already runs there" in second.stderr
-    assert "Traceback" not in second.stderr
-    assert daemon.status()["loop"]["alive"]
-
-
-def test_a_killed_loop_is_reported_and_the_watchdog_is_not_fed(
-    daemon: RealDaemon, manager: Manager
-) -> None:
-    children = daemon.children()
-    os.kill(children["loop"], signal.SIGKILL)
-    until(lambda: "the loop has died: killed by signal 9" in daemon.status()["reason"])
-    told = daemon.wait_for("dead")
-    assert not told["loop"]["alive"]
-    manager.hears("STATUS=dead: the loop has died: killed by signal 9")
-    assert "WATCHDOG=1" not in manager.heard(1.0)
-    assert daemon.http.post("/hold", json={}).status_code == 503
-    assert daemon.children()["service"] == children["service"]
-    for command in ("ack", "enable", "hold"):
-        refused = cdpr(command, *daemon.at)
-        assert refused.returncode == 1
-        assert (
-            "killed by signal 9; its drives had been commanded to switch off; next: `cdpr stop`"
-            in refused.stderr
-        )
-    shown = cdpr("status", *daemon.at).stdout
-    assert "next: `cdpr stop`" in shown and "the following is " in shown
-    stopped = cdpr("stop", *daemon.at)  # ends the remaining processes
-    assert stopped.returncode == 1
-    assert "its loop had died: its drives had been commanded to switch off" in stopped.stderr
-    assert daemon.process.wait(60.0) == 1
-    nothing = cdpr("stop", *daemon.at)
-    assert (nothing.returncode, nothing.stdout) == (0, "nothing runs\n")
-    assert daemon.end() == 1
-    assert not any(alive(pid) for pid in children.values())
-    assert not daemon.socket.exists()
 
 
 def test_loop_and_service_end_properly_after_the_launcher_was_killed(tmp_path: Path) -> None:

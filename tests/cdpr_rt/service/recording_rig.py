@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fork_server import FORKED
 from mcap.reader import make_reader
 
 from cdpr_rt.core.cycle_row import AXES, Row, cycle_dtype
@@ -25,23 +22,6 @@ DESCRIPTION = {
     "programs": ["idle", "hold", "jog"],
     "version": "0.0",
 }
-_CHILD = """
-import json, os, resource, sys
-from pathlib import Path
-from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.service.recording import Recorder
-
-fd, folder, most_file_bytes = int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-if most_file_bytes:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_file_bytes, most_file_bytes))
-recorder = Recorder(SharedBlock.attach(fd), folder, "bench", reserve_bytes=0)
-recorder.start()
-print("ready", flush=True)
-for line in sys.stdin:
-    print(json.dumps(recorder.status()), flush=True)
-recorder.stop()
-print(json.dumps(recorder.status()), flush=True)
-"""
 
 
 def made_rows(first: int, count: int, n: int = 2) -> Row:
@@ -78,43 +58,6 @@ def put(writer: RowWriter, rows: Row) -> None:
     for k in range(rows.size):
         writer.slot()[:] = rows[k]
         writer.commit()
-
-
-class RecorderProcess:
-    """A recorder in another process, which may be killed or lack disk space."""
-
-    def __init__(self, block: SharedBlock, folder: Path, most_file_bytes: int = 0) -> None:
-        arguments = [str(block.fd), str(folder), str(most_file_bytes)]
-        self.process = subprocess.Popen(
-            [*FORKED, _CHILD, *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            pass_fds=[block.fd],
-        )
-        assert self._line() == "ready"
-
-    def _line(self) -> str:
-        assert self.process.stdout is not None
-        return self.process.stdout.readline().strip()
-
-    def status(self) -> dict[str, Any]:
-        assert self.process.stdin is not None
-        self.process.stdin.write("\n")
-        self.process.stdin.flush()
-        value: dict[str, Any] = json.loads(self._line())
-        return value
-
-    def stop(self) -> dict[str, Any]:
-        assert self.process.stdin is not None
-        self.process.stdin.close()
-        value: dict[str, Any] = json.loads(self._line())
-        self.process.wait(120)
-        return value
-
-    def kill(self) -> None:
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait(120)
 
 
 def run_for(writer: RowWriter, seconds: float, first: int) -> int:

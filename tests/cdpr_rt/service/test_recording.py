@@ -15,10 +15,9 @@ from cdpr_rt.core.states import Reaction
 from cdpr_rt.motion.pose_stream import confirmation, stream_buttons
 from cdpr_rt.service.recording import EventDetector, Recorder
 from cdpr_rt.service.recording_file import RecordingError
-from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, Columns, RecordingReader
+from cdpr_rt.service.recording_reader import CLOSED, CUT, Columns, RecordingReader
 from tests.cdpr_rt.service.recording_rig import (
     DESCRIPTION,
-    RecorderProcess,
     block_with_clock,
     made_rows,
     put,
@@ -149,33 +148,6 @@ def test_two_equal_runs_at_different_times_give_the_same_messages(tmp_path: Path
     first, second = told
     assert first.pop("/timing") != second.pop("/timing")
     assert first == second and len(first["/status"]) == 1 and len(first["/events"]) == 4
-
-
-@pytest.mark.long
-def test_the_file_of_a_killed_recorder_is_complete_and_the_next_one_continues_it(
-    tmp_path: Path,
-) -> None:
-    block = block_with_clock()
-    writer = RowWriter(block)
-    first = RecorderProcess(block, tmp_path)
-    written = run_for(writer, 2.0, 0)
-    # all but the last second, as a recorder may wait for a core
-    wait_until(lambda: int(block.counters["recorded"][0]) >= written - 1000)
-    first.kill()
-    safe = int(block.counters["recorded"][0])
-    (path,) = tmp_path.iterdir()
-    kept = stock_cycles(path)
-    assert kept == list(range(len(kept)))
-    assert len(kept) >= safe
-    reader = RecordingReader(path)
-    assert sum(part["cycle"].size for part in reader.cycles()) == len(kept)
-    assert reader.ended == KILLED
-
-    second = RecorderProcess(block, tmp_path)
-    written = run_for(writer, 0.3, written)
-    told = second.stop()
-    assert told["error"] == "" and told["lost_rows"] == 0
-    assert stock_cycles(*sorted(tmp_path.iterdir())) == list(range(written))
 
 
 def test_a_truncated_recording_is_read_up_to_the_cut(recorded: Path, tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from cdpr_rt.service.recording import Recorder, reserve_of
 from cdpr_rt.service.recording_reader import RecordingReader
 from cdpr_rt.service.retention import Retention
 from tests.cdpr_rt.service.recording_rig import (
-    RecorderProcess,
     block_with_clock,
     made_rows,
     put,
@@ -25,30 +24,6 @@ from tests.cdpr_rt.service.recording_rig import (
 )
 
 pytestmark = pytest.mark.long
-
-
-def test_a_full_disk_ends_only_the_recording(tmp_path: Path) -> None:
-    block = block_with_clock()
-    writer = RowWriter(block)
-    recorder = RecorderProcess(block, tmp_path, most_file_bytes=300_000)
-    written = 0
-    while not (told := recorder.status())["error"]:
-        put(writer, made_rows(written, 500))
-        written += 500
-        wait_until(
-            lambda upto=written: block.counters["recorded"][0] == upto or recorder.status()["error"]
-        )
-        assert written < 20_000
-    assert "File too large" in told["error"] and "bench-" in told["error"]
-    assert not told["recording"]
-    run_for(writer, 0.3, written)
-    told = recorder.stop()
-    (path,) = tmp_path.iterdir()  # no second file was begun
-    assert path.stat().st_size <= 300_000
-    kept = stock_cycles(path)
-    assert kept == list(range(len(kept))) and len(kept) > 100
-    # only rows on the disk are counted as recorded
-    assert int(block.counters["recorded"][0]) == len(kept)
 
 
 def test_the_file_is_readable_after_power_fails_during_any_write(
