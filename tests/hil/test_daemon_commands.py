@@ -97,6 +97,19 @@ def test_a_jog_has_the_requested_speed_and_duration(quick: RealDaemon, terminal:
     assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0  # with this slow cycle
 
 
+def test_the_axis_stops_after_a_jogging_client_was_killed(quick: RealDaemon) -> None:
+    words = ("jog", "left=60", "--seconds", "60", *quick.at)
+    client = subprocess.Popen([sys.executable, "-m", "cdpr_tools.cli", *words])
+    until(lambda: quick.status()["program"] == "jog")
+    until(lambda: quick.status()["axes"][0]["velocity_rad_s"] > 0.5)
+    assert quick.status()["control"]["client"]
+    client.kill()
+    client.wait()
+    until(lambda: quick.status()["program"] == "hold")
+    until(lambda: abs(quick.status()["axes"][0]["velocity_rad_s"]) < 0.1)
+    assert "nobody holds the right to move" in quick.status()["reason"]
+
+
 def test_a_controller_runs_to_its_end_and_then_holds(quick: RealDaemon, terminal: Terminal) -> None:
     sweep = ("sweep", "distance_rad=[0.2, 0.2]", "speed_rad_s=0.4", "legs=2")
     result = terminal.told("controller", *sweep, *quick.at)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -31,13 +29,6 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
     # requests save robots and procedures
     own = {f"XDG_{name}_HOME": str(folder / name) for name in ("CONFIG", "STATE")}
     with running(folder, *with_key(folder), period_s=0.01, env=own) as one:
-        yield one
-
-
-@pytest.fixture(scope="module")
-def quick_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """A daemon that moves, with a cycle fast enough for a stiff position loop."""
-    with running(tmp_path_factory.mktemp("quick"), period_s=0.002) as one:
         yield one
 
 
@@ -125,12 +116,6 @@ def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
         yield one
 
 
-@pytest.fixture
-def quick(quick_daemon: RealDaemon) -> Iterator[RealDaemon]:
-    with with_power(quick_daemon) as one:
-        yield one
-
-
 def test_no_request_without_the_right_to_move_moves_an_active_robot(
     active: RealDaemon, description: Any, url: str
 ) -> None:
@@ -152,28 +137,6 @@ def test_no_request_without_the_right_to_move_moves_an_active_robot(
     assert active.status()["program"] == "hold", happened(active)
     assert angles(active) == pytest.approx(before, abs=10.0)
     assert resident_B(service) - memory_B < MORE_MEMORY_B
-
-
-def test_the_axis_stops_after_a_jogging_client_was_killed(quick: RealDaemon) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "cdpr_tools.cli",
-        "jog",
-        "left=60",
-        "--seconds",
-        "60",
-        *quick.at,
-    ]
-    client = subprocess.Popen(command)
-    until(lambda: quick.status()["program"] == "jog")
-    until(lambda: quick.status()["axes"][0]["velocity_rad_s"] > 0.5)
-    assert quick.status()["control"]["client"]
-    client.kill()
-    client.wait()
-    until(lambda: quick.status()["program"] == "hold")
-    until(lambda: abs(quick.status()["axes"][0]["velocity_rad_s"]) < 0.1)
-    assert "nobody holds the right to move" in quick.status()["reason"]
 
 
 def test_a_restarted_service_does_not_need_the_key_file(daemon: RealDaemon, url: str) -> None:
