@@ -99,16 +99,6 @@ def test_a_hold_by_another_client_ends_the_motion(robot: cdpr.Robot, daemon: Rea
     assert (robot.state, robot.program) == ("active", "hold")
 
 
-def test_a_fault_names_its_limit_and_can_be_acknowledged(robot: cdpr.Robot) -> None:
-    robot.turn_by([0.5, 0.0], speed_rad_s=0.02, wait=False)
-    robot.inject_fault("left", "drive-fault")
-    with pytest.raises(cdpr.Faulted, match="left") as fault:
-        robot.wait_until_done()
-    assert fault.value.limit == "drive"
-    robot.acknowledge()
-    assert robot.state == "ready"
-
-
 def test_an_enable_whose_body_comes_after_a_stop_gives_no_power(daemon: RealDaemon) -> None:
     with cdpr.connect(socket=daemon.socket) as robot:
         robot.disable()

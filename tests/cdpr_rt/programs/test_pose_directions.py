@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ideal_platform import PERIOD_S, PLANE, ROOM, IdealPlatform, home_rotation, rotation_of, seven
+from ideal_platform import PERIOD_S, PLANE, ROOM, IdealPlatform, home_rotation, rotation_of
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.motion.hand_target import multiply, to_quaternion, to_rotation_vector
@@ -95,18 +95,6 @@ def test_a_relative_motion_out_of_the_workspace_is_rejected(robot: IdealPlatform
         robot.pose.command({"distance_m": [0.0] * k, "position_m": [0.0] * k})
     with pytest.raises(ProgramError, match="frame: value 'home'; allowed: room, platform"):
         robot.pose.command({"distance_m": [0.0] * k, "frame": "home"})
-
-
-def test_the_pose_setpoint_equals_that_by_scipys_rotations(robot: IdealPlatform) -> None:
-    position, rotation = split(robot)
-    robot.pose.command({"position_m": position, "rotation_rad": rotation})
-    robot.until_rest()
-    told = robot.pose.pose_setpoint
-    assert told is not None
-    target = np.array([*position, *rotation])
-    assert told == pytest.approx(seven(robot.model, target), abs=1e-12)
-    Q = (rotation_of(robot.model, target) * home_rotation(robot.model)).as_matrix()
-    np.testing.assert_allclose(robot.model.pose(target).Q, Q, atol=1e-12)
 
 
 def test_progress_reports_position_and_rotation(robot: IdealPlatform) -> None:

@@ -7,8 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
@@ -17,7 +15,7 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
 from cdpr_rt.model.platform_model import platform_model
 from cdpr_rt.model.robot_arrays import winches_of
-from cdpr_rt.motion.pose_stream import CLUTCH, PoseStream
+from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.platform.cable_control import CableControl
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform_program import PlatformParts
@@ -360,33 +358,3 @@ def test_a_trembling_hand_does_not_move_the_platform(robot: LedPlatform) -> None
     robot.lead(np.zeros((5, 2)))
     robot.lead(chance.uniform(-1e-5, 1e-5, (200, 2)))
     assert np.ptp(np.array(robot.path)[200:], axis=0).max() < 1e-5
-
-
-steps = st.tuples(
-    st.floats(-2.0, 2.0, width=32) | st.just(float("nan")),
-    st.floats(-2.0, 2.0, width=32) | st.just(float("inf")),
-    st.sampled_from((0.5, 1.0, 8.0)),
-    st.sampled_from((0, 0, 0, CLUTCH)),
-    st.integers(1, 120),
-)
-
-
-@settings(max_examples=25)
-@given(st.lists(steps, min_size=5, max_size=25))
-def test_no_stream_causes_a_step_or_leaves_the_workspace(
-    made: LedPlatform, hand: list[tuple[float, float, float, int, int]]
-) -> None:
-    made.restart()
-    made.program.command({"stream": True})
-    for x, y, scale, buttons, cycles in hand:
-        made.post(x, y, scale, buttons)
-        for _ in range(cycles):
-            made.cycle()
-    made.run(0.9)  # silence is tolerated for half a second
-    made.check_motion()
-    assert made.platform is not None
-    path = np.array(made.path)
-    assert (path >= np.array(made.platform.workspace_min_m) - 1e-9).all()
-    assert (path <= np.array(made.platform.workspace_max_m) + 1e-9).all()
-    assert np.isfinite(made.torque).all()
-    assert made.control.velocity == pytest.approx(np.zeros(2), abs=1e-6), "silence ends motion"

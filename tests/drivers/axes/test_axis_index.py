@@ -66,15 +66,6 @@ def test_the_probe_finds_the_same_index_in_both_directions(rig: Rig) -> None:
     assert _turns_apart(found[0], found[2]) <= COUNT_RAD
 
 
-def test_homing_works_on_a_drive_with_reversed_homing_directions(bus: str) -> None:
-    mirrored = DRIVE.model_copy(update={"homing_sign": -1})
-    with open_rig(bus, drive=mirrored) as rig:
-        Homing(rig.group, 0, 34).configure()
-        assert rig.network.read_int(1, 0x6098) == 33
-        Homing(rig.group, 0, 37 if 37 in DRIVE.homing_methods else 35).configure()
-        assert rig.network.read_int(1, 0x6098) in (35, 37)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_the_mirrored_homing_method_moves_in_opposite_directions(method: int) -> None:
     assert METHODS[MIRRORED[method]] == METHODS[method].mirrored()

@@ -14,7 +14,7 @@ from cdpr_sim_bus.bus.client import PACKET_BYTES
 from cdpr_sim_bus.bus.hub import Hub
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.errors import BusSetupError, SimulatorError
-from cdpr_sim_bus.frame import ERR_FLAG, RTR_FLAG, pack_frame
+from cdpr_sim_bus.frame import ERR_FLAG, pack_frame
 
 StartBus = Callable[..., Any]
 
@@ -28,22 +28,6 @@ def test_a_frame_reaches_all_but_its_sender(start_bus: StartBus, stub_node: type
         assert other.recv() == pack_frame(0x123, b"hello")
     assert sender.quiet()
     assert [frame for frame, _ in node.seen] == [pack_frame(0x123, b"hello")]
-
-
-def test_filters_work_as_those_of_raw_can_sockets(start_bus: StartBus) -> None:
-    bus = start_bus()
-    sender, picky, deaf = bus.join(), bus.join(), bus.join()
-    picky.filters((0x180, 0x780), (0x605, 0x7FF | RTR_FLAG))
-    deaf.filters()
-    for can_id in (0x17F, 0x181, 0x1FF, 0x200, 0x605, 0x605 | RTR_FLAG, 0x606):
-        sender.send(can_id)
-    assert [picky.recv_id() for _ in range(3)] == [0x181, 0x1FF, 0x605]
-    assert picky.quiet()
-    assert deaf.quiet()
-    picky.filters((0x606, 0x7FF))
-    sender.send(0x181)
-    sender.send(0x606)
-    assert picky.recv_id() == 0x606
 
 
 def test_the_last_frames_of_a_client_that_left_frames_unread_are_delivered(
@@ -61,18 +45,6 @@ def test_the_last_frames_of_a_client_that_left_frames_unread_are_delivered(
     while len(bus.hub._clients) > 1:
         assert time.monotonic() < end_s
         time.sleep(0.01)
-
-
-def test_filter_lists_may_be_sent_in_parts(start_bus: StartBus) -> None:
-    bus = start_bus()
-    sender, picky = bus.join(), bus.join()
-    picky.sock.send(json.dumps({"filters": [[1, 0x7FF]]}).encode())
-    picky.sock.send(json.dumps({"more_filters": [[2, 0x7FF]]}).encode())
-    picky.status()
-    for can_id in (1, 2, 3):
-        sender.send(can_id)
-    assert [picky.recv_id(), picky.recv_id()] == [1, 2]
-    assert picky.quiet()
 
 
 def test_identical_lss_answers_become_one_frame(start_bus: StartBus, stub_node: type) -> None:
@@ -228,14 +200,6 @@ def test_invalid_frames_are_counted_and_dropped(start_bus: StartBus) -> None:
     assert other.quiet()
     status = sender.status()
     assert (status["malformed"], status["frames"]) == (2, 0)
-
-
-def test_status_reports_name_mode_bit_rate_and_nodes(start_bus: StartBus, stub_node: type) -> None:
-    bus = start_bus(stub_node(7), stub_node(9), mode=ClockMode.PACED, bitrate=500_000)
-    status = bus.join().status()
-    assert status["name"] == bus.name
-    assert (status["mode"], status["bitrate"], status["nodes"]) == ("paced", 500_000, [7, 9])
-    assert status["truth_log"] is None
 
 
 @pytest.mark.parametrize(

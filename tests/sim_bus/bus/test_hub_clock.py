@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -15,22 +14,6 @@ from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.frame import LONGEST_FRAME_BITS, pack_frame
 
 LAW = settings(max_examples=200)
-
-
-def test_paced_time_is_wall_time() -> None:
-    clock = BusClock(ClockMode.PACED, 100.0)
-    assert clock.sync(100.25, 0.001) == pytest.approx(0.25)
-    assert clock.now(103.0) == pytest.approx(3.0)
-    assert not clock.held
-    assert clock.wall_wait(103.0, 3.5) == pytest.approx(0.5)
-
-
-def test_lockstep_time_counts_syncs_and_not_wall_time() -> None:
-    clock = BusClock(ClockMode.LOCKSTEP, 50.0)
-    start = clock.sync(50.0, 0.002)
-    for k in range(1, 500):
-        assert clock.sync(50.0 + 0.3 * k, 0.002) == pytest.approx(start + 0.002 * k)
-        assert clock.now(50.0 + 0.3 * k + 0.1) == pytest.approx(start + 0.002 * k)
 
 
 def test_lockstep_time_stands_still_unless_running() -> None:
@@ -172,28 +155,6 @@ def test_hub_reports_an_overrun_of_eight_drives_at_1_ms(
     assert status["frames"] == 10 * 17
     assert status["overruns"] == (0 if fits else 9)
     assert status["peak_cycle_load"] == pytest.approx(0.9475 if fits else 1.895)
-
-
-def test_time_of_nodes_stands_between_syncs_and_runs_after_the_last_one(
-    start_bus: Callable[..., object], stub_node: type
-) -> None:
-    node = stub_node(5, sync_period_s=0.01, answers=(pack_frame(0x185),))
-    member = start_bus(node).join()  # type: ignore[attr-defined]
-    for _ in range(20):
-        started = time.monotonic()  # overwritten until the last SYNC
-        member.send(0x205)
-        member.send(0x80)
-        assert member.recv_id() == 0x185
-    syncs = [now for frame, now in node.seen if frame[0] == 0x80]
-    rpdos = [now for frame, now in node.seen if frame[0] == 0x05]
-    assert [b - a for a, b in pairwise(syncs)] == pytest.approx([0.01] * 19)
-    assert rpdos[1:] == syncs[:-1]
-    due = syncs[-1] + 0.05
-    node.timers.append(due)
-    assert member.recv_id() == 0x705
-    waited = time.monotonic() - started
-    assert waited > HOLD_S + 0.03
-    assert node.advanced[-1] == due
 
 
 def test_a_timer_due_between_two_syncs_sends_before_the_second(

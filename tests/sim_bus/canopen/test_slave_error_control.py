@@ -12,7 +12,6 @@ from tests.sim_bus.canopen.slave_bench import MASTER, NODE, RTR, Bench
 
 HEARTBEAT = 0x700 + NODE
 EMCY = 0x80 + NODE
-SDO_READ_1000 = bytes.fromhex("4000100000000000")
 
 
 def watch_master(bench: Bench, period_ms: int) -> None:
@@ -53,31 +52,6 @@ def test_nmt_for_others_and_nonsense_is_ignored(bench: Bench) -> None:
     assert bench.slave.nmt_state == NmtState.PRE_OPERATIONAL
 
 
-def test_communication_reset_keeps_and_node_reset_restores_application_parameters(
-    bench: Bench,
-) -> None:
-    def change() -> None:
-        bench.write(0x1017, 0, (500).to_bytes(2, "little"))
-        bench.write(0x6072, 0, (123).to_bytes(2, "little"))
-
-    change()
-    bench.nmt(130)
-    assert (bench.od.get(0x1017), bench.od.get(0x6072)) == (0, 123)
-    assert ("reset",) not in bench.app.events[2:]
-    change()
-    bench.nmt(129)
-    assert bench.od.get(0x1017) == 0
-    assert bench.od.get(0x6072) == bench.od.entry(0x6072).default != 123
-    assert ("reset",) in bench.app.events[2:]
-
-
-def test_reset_keeps_read_only_objects(bench: Bench) -> None:
-    bench.od.set(0x6064, 0, 4711)
-    bench.od.set(0x1018, 4, 77)
-    bench.nmt(129)
-    assert (bench.od.get(0x6064), bench.od.get(0x1018, 4)) == (4711, 77)
-
-
 def test_heartbeat_is_sent_at_its_period_with_the_nmt_state(bench: Bench) -> None:
     bench.write(0x1017, 0, (250).to_bytes(2, "little"))
     bench.nmt(1)
@@ -89,12 +63,6 @@ def test_heartbeat_is_sent_at_its_period_with_the_nmt_state(bench: Bench) -> Non
     bench.nmt(128)
     bench.write(0x1017, 0, b"\0\0")
     assert bench.run_to(5.0) == []
-
-
-def test_heartbeat_keeps_its_period_when_time_advances_in_cycles(bench: Bench) -> None:
-    bench.write(0x1017, 0, (10).to_bytes(2, "little"))
-    beats = [k for k in range(1, 101) if any(i == HEARTBEAT for i, _ in bench.sync())]
-    assert beats == list(range(10, 101, 10))
 
 
 def test_node_guarding_request_is_answered_with_a_toggle(bench: Bench) -> None:
@@ -228,12 +196,3 @@ def test_emergency_waits_in_stopped_and_can_be_disabled(bench: Bench) -> None:
     bench.write(0x1014, 0, (0x90).to_bytes(4, "little"))
     bench.slave.emergency(0xFF03, 0)
     assert [i for i, _ in bench.take()] == [0x90]
-
-
-def test_node_reset_clears_errors_that_a_communication_reset_keeps(bench: Bench) -> None:
-    bench.slave.emergency(0xFF01, 0x80)
-    bench.send(0x200 + NODE, b"")
-    bench.nmt(130)
-    assert bench.od.get(0x1001) == 0x81
-    bench.nmt(129)
-    assert (bench.od.get(0x1001), bench.od.get(0x1003)) == (0, 0)

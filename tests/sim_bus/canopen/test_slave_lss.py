@@ -120,31 +120,3 @@ def test_bit_timing_is_checked_and_activated_after_silence(master: type[LssMaste
     assert bench.run_to(0.3) == []  # a bus at 1 Mbit/s does not receive its frames any more
     assert bench.slave.bitrate == 500_000
     assert bench.send(0x600 + NODE, b"\x40\x00\x10".ljust(8, b"\0")) == []
-
-
-def test_the_bit_timing_of_the_bus_is_activated_after_silence(master: type[LssMaster]) -> None:
-    bench = lss_bench(NODE)
-    bench.write(0x1017, 0, (10).to_bytes(2, "little"))
-    lss = bench.network.lss
-    lss.send_switch_state_global(lss.CONFIGURATION_STATE)
-    lss.configure_bit_timing(0)
-    lss.activate_bit_timing(100)
-    assert bench.run_to(0.19) == []
-    assert bench.run_to(0.3) != []
-    assert bench.sdo(b"\x40\x00\x10")[0] == 0x43
-
-
-def test_a_stored_bit_rate_is_active_after_the_next_power_up(
-    master: type[LssMaster], tmp_path: Path
-) -> None:
-    path = tmp_path / "drive.json"
-    bench = lss_bench(NODE, ParameterStore(path))
-    lss = bench.network.lss
-    lss.send_switch_state_global(lss.CONFIGURATION_STATE)
-    lss.configure_bit_timing(2)
-    lss.store_configuration()
-    assert bench.sdo(b"\x40\x00\x10")[0] == 0x43  # until then nothing has changed
-    for bus_bitrate, heard in ((1_000_000, []), (500_000, [(0x700 + NODE, b"\0")])):
-        again = Bench(store=ParameterStore(path), bitrate=bus_bitrate)
-        again.slave.advance(0.0)
-        assert again.take() == heard

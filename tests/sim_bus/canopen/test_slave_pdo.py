@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 
 from tests.sim_bus.canopen.slave_bench import GENERIC_EDS, NODE, RTR, Bench, Recorder
 
-TPDO1, TPDO2, TPDO3 = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
-RPDO1, RPDO2 = 0x200 + NODE, 0x300 + NODE
+TPDO1, TPDO2, RPDO1 = 0x180 + NODE, 0x280 + NODE, 0x200 + NODE
 EMCY = 0x80 + NODE
-STATUSWORD, POSITION, MODE_DISPLAY = 0x60410010, 0x60640020, 0x60610008
+POSITION, MODE_DISPLAY = 0x60640020, 0x60610008
 CONTROLWORD, TARGET_TORQUE, MAX_TORQUE = 0x60400010, 0x60710010, 0x60720010
 
 
@@ -34,24 +33,6 @@ def running(bench: Bench) -> Bench:
     """Return a slave in OPERATIONAL with TPDO2 disabled and TPDO1 as in the EDS."""
     bench.write(0x1801, 1, (0x80000000 | TPDO2).to_bytes(4, "little"))
     return bench.start()
-
-
-def test_default_pdos_are_exchanged_at_each_sync(running: Bench) -> None:
-    od = running.od
-    od.set(0x6041, 0, 0x1237)
-    od.set(0x6077, 0, -321)
-    running.nmt(128)
-    od.on_read(0x6064, 0, lambda: -5)
-    running.nmt(1)
-    expected = (TPDO1, struct.pack("<Hih", 0x1237, -5, -321))
-    assert running.sync() == [expected]
-    assert running.send(RPDO1, struct.pack("<Hh", 0x0F, -700)) == []
-    assert od.get(0x6040) == 0
-    assert running.sync() == [expected]
-    assert (od.get(0x6040), od.get(0x6071)) == (0x0F, -700)
-    running.write(0x6071, 0, b"\0\0")
-    running.sync()
-    assert od.get(0x6071) == 0
 
 
 def test_a_sync_first_latches_then_applies_rpdos_then_acts_then_samples_tpdos(bench: Bench) -> None:

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_sim_bus.canopen import Abort, SdoAbort
 from cdpr_sim_bus.canopen.sdo import TIMEOUT_S
 from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
@@ -169,28 +168,9 @@ def test_values_beyond_the_limits_of_an_object_are_rejected(bench: Bench) -> Non
         assert bench.od.get(0x6071) == value
 
 
-def test_defaults_of_the_eds_are_served(odd_bench: Bench) -> None:
-    assert odd_bench.od.get(0x2107) == 0
-    assert odd_bench.read(0x2100) == b"\x56\x34\x12"
-    assert odd_bench.read(0x2109) == b"\xfe\xca\0\0"
-    assert odd_bench.read(0x1800, 1) == (0x180 + NODE).to_bytes(4, "little")
-    assert odd_bench.remote.sdo[0x1008].raw == "Generic CiA 402 torque servo"
-
-
 def test_an_expedited_download_without_size_uses_the_size_of_the_object(bench: Bench) -> None:
     assert bench.sdo(bytes.fromhex("2240600006000000"))[0] == 0x60
     assert bench.od.get(0x6040) == 6
-
-
-def test_callbacks_may_reject_a_write_and_provide_a_read(bench: Bench) -> None:
-    def refuse(value: object) -> None:
-        raise SdoAbort(Abort.LOCAL_CONTROL)
-
-    bench.od.on_write(0x6060, 0, refuse)
-    bench.od.on_read(0x6064, 0, lambda: -2)
-    assert refused(bench, 0x6060, 0, b"\x0a") == 0x08000021
-    assert bench.od.get(0x6060) == 0
-    assert bench.read(0x6064) == b"\xfe\xff\xff\xff"
 
 
 def test_wrong_toggle_bit_aborts_upload_and_download(bench: Bench) -> None:
@@ -240,19 +220,3 @@ def test_server_is_closed_in_stopped(bench: Bench) -> None:
     assert bench.run_to(60.0) == []
     bench.nmt(128)
     assert abort_of(bench.sdo(b"\x60"))[2] == 0x05040001
-
-
-def test_a_third_party_can_read_each_readable_object(bench: Bench) -> None:
-    for index in bench.remote.object_dictionary:
-        record = bench.remote.object_dictionary[index]
-        variables = (
-            [record]
-            if isinstance(record, canopen.objectdictionary.ODVariable)
-            else record.subindices.values()
-        )
-        for variable in variables:
-            if not variable.readable or (index == 0x1003 and variable.subindex):
-                continue
-            raw = bench.read(index, variable.subindex)
-            if variable.fixed_size:
-                assert len(raw) * 8 == len(variable)

@@ -38,27 +38,6 @@ def test_stored_values_survive_a_power_cycle_and_resets(tmp_path: Path) -> None:
         assert (device.od.get(0x60FF), device.od.get(0x6040)) == (7, 8)
 
 
-def test_areas_are_stored_and_restored_separately(bench: Bench) -> None:
-    def change() -> None:
-        bench.write(0x1017, 0, (750).to_bytes(2, "little"))
-        bench.write(0x6072, 0, (555).to_bytes(2, "little"))
-
-    change()
-    bench.write(0x1010, 2, b"save")
-    bench.nmt(129)
-    assert bench.od.get(0x1017) == 750
-    assert bench.od.get(0x6072) != 555
-    change()
-    bench.write(0x1010, 3, b"save")
-    bench.write(0x1011, 2, b"load")
-    assert bench.od.get(0x1017) == 750
-    bench.nmt(129)
-    assert (bench.od.get(0x1017), bench.od.get(0x6072)) == (0, 555)
-    bench.write(0x1011, 1, b"load")
-    bench.nmt(129)
-    assert bench.od.get(0x6072) == bench.od.entry(0x6072).default != 555
-
-
 def test_stored_identifiers_follow_the_node_id(tmp_path: Path) -> None:
     path = tmp_path / "drive.json"
     power_cycle(path).write(0x1010, 1, b"save")

@@ -32,16 +32,6 @@ def test_the_stamp_is_kept_until_a_parameter_changes(bench: Bench) -> None:
     assert _stamp(bench) == (0, 0)
 
 
-def test_application_parameters_clear_the_stamp_and_process_data_do_not(bench: Bench) -> None:
-    _write_stamp(bench)
-    bench.write(0x6072, 0, struct.pack("<H", 321))
-    assert _stamp(bench) == (0, 0)
-    _write_stamp(bench)
-    bench.write(0x1003, 0, b"\0")
-    bench.write(0x1010, 1, SAVE)
-    assert _stamp(bench) == (15000, 1234567)
-
-
 def test_a_rejected_write_keeps_the_stamp(bench: Bench) -> None:
     _write_stamp(bench)
     for index, sub, data in ((0x1016, 1, b"\x64\0\x7f\xff"), (0x1000, 0, bytes(4))):
@@ -64,17 +54,3 @@ def test_the_stamp_is_stored_and_restored_with_the_parameters(bench: Bench) -> N
     bench.write(0x1011, 1, LOAD)
     bench.nmt(129)
     assert _stamp(bench) == (0, 0)
-
-
-def test_a_communication_reset_clears_the_stamp_if_application_parameters_changed(
-    bench: Bench,
-) -> None:
-    _write_stamp(bench)
-    bench.write(0x1010, 1, SAVE)
-    bench.write(0x6072, 0, struct.pack("<H", 321))
-    bench.nmt(130)
-    assert bench.od.get(0x6072) == 321
-    assert _stamp(bench) == (0, 0)
-    bench.nmt(129)
-    assert bench.od.get(0x6072) != 321
-    assert _stamp(bench) == (15000, 1234567)
