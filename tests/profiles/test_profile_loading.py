@@ -314,27 +314,6 @@ def test_a_drive_without_its_eds_is_rejected(tmp_path: Path):
         cdpr_profiles.load_drive(tmp_path / "generic-cia402.toml")
 
 
-def test_columns_of_the_cable_table_agree_with_each_other_and_with_the_shipped_cable():
-    path = SHIPPED / "cables" / "barry-dyneema.series.toml"
-    series = read_toml_model(path, CableSeries)
-    assert len(series.sizes) == 15
-    for size in series.sizes:
-        whole, _, fraction = size.diameter_in.rpartition("-")
-        top, _, bottom = fraction.partition("/")
-        inches = int(whole or 0) + int(top) / int(bottom or 1)
-        assert inches * 25.4 == pytest.approx(size.diameter_mm, abs=0.06)
-        lb_per_100_ft = size.mass_kg_per_100_m * 0.67197
-        assert lb_per_100_ft == pytest.approx(size.mass_lb_per_100_ft, abs=0.1)
-        kgf = size.breaking_force_lbf * 0.45359237
-        assert kgf == pytest.approx(size.breaking_force_kgf, rel=0.012)
-    cable = cdpr_profiles.load_cable("dyneema-4.8mm")
-    row = next(s for s in series.sizes if s.code == cable.data_sheet_code)
-    assert cable.diameter_m == pytest.approx(row.diameter_mm * 1e-3)
-    assert cable.breaking_force_kgf == row.breaking_force_kgf
-    assert cable.breaking_force_N == pytest.approx(23144, abs=1)
-    assert cable.stiffness_N == pytest.approx(40e3)
-
-
 def test_the_examples_in_describing_your_winch_load(tmp_path: Path):
     page = Path(__file__).parents[2] / "docs" / "how-to" / "describing-your-winch.md"
     examples = page.read_text(encoding="utf-8").split("```toml\n")[1:]

@@ -274,14 +274,6 @@ def test_a_winch_loads_as_a_robot_with_one_axis() -> None:
         load_robot("winch-mpp0923")
 
 
-def test_eight_drives_load_one_bus_to_95_percent() -> None:
-    robot = load_robot("one-bus-8")
-    (budget,) = machine_budget(robot)
-    assert budget.fits
-    assert 0.95 <= 1.0 / robot.sync_period_s / budget.highest_rate_Hz < 0.96
-    assert len(load_robot("bench-2").axes) == 2
-
-
 # -- what the documentation says
 
 

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import can
@@ -167,21 +166,6 @@ def test_a_python_can_interface_works_like_other_ports() -> None:
         with pytest.raises(OSError, match="closed") as caught:
             port.send(frame(0x80))
         assert "is lost" in str(port.lost(caught.value))
-
-
-def test_rows_and_array_of_a_frame_buffer_share_memory() -> None:
-    buffer = FrameBuffer(3)
-    buffer.rows[1][:] = frame(0x181 | EFF_FLAG, b"abc")
-    assert buffer.array["can_id"].tolist() == [0, 0x181 | EFF_FLAG, 0]
-    assert bytes(buffer.array["data"][1]) == b"abc\0\0\0\0\0"
-    buffer.array["length"][2] = 8
-    assert buffer.rows[2][4] == 8
-
-
-def test_send_and_recv_into_are_methods_of_the_socket(port: FramePort) -> None:
-    assert isinstance(getattr(port.send, "__self__", None), socket.socket)
-    assert isinstance(getattr(port.recv_into, "__self__", None), socket.socket)
-    assert Path(f"/proc/self/fd/{port.fileno()}").exists()
 
 
 # -- a node that babbles

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from cdpr_drivers.bus.frames import FRAME, Batch, FrameBuffer
+from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.bus.simbus import LedPort, SimulatedBus
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
@@ -40,16 +40,6 @@ class Led:
     def time(self, now_s: float, *identifiers: int) -> None:
         self.send(b"bus-time", now_s, *identifiers)
 
-    def sent(self) -> list[bytes]:
-        """Return the packets that the bus has received."""
-        packets = []
-        self.far.setblocking(False)
-        while True:
-            try:
-                packets.append(self.far.recv(4096))
-            except BlockingIOError:
-                return packets
-
 
 @pytest.fixture
 def led() -> Iterator[Led]:
@@ -75,45 +65,6 @@ def test_data_packets_are_received_before_the_time_packet(led: Led) -> None:
     assert (led.taken, led.bus.now_s) == ([*range(129)], 0.5)
     assert led.bus.receive_until_time()
     assert (led.taken, led.bus.now_s) == ([*range(130)], 0.6)
-
-
-def commands(led: Led, n: int) -> tuple[Batch, FrameBuffer, bytes]:
-    """Return a batch of n frames, their buffer, and the frames as sent."""
-    buffer = FrameBuffer(n)
-    for k, row in enumerate(buffer.rows):
-        row[:] = frame(0x200 + k)
-    return led.port.batch(buffer), buffer, b"".join(map(bytes, buffer.rows))
-
-
-def test_two_to_26_commands_are_sent_in_one_packet(led: Led) -> None:
-    for n in (2, 4, 26):
-        batch, _, frames = commands(led, n)
-        batch.send()
-        assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
-
-
-SYNC = frame(0x80)
-
-
-def test_a_sync_after_2_to_25_commands_is_in_their_packet(led: Led) -> None:
-    for n in (2, 25):
-        batch, _, frames = commands(led, n)
-        batch.send(SYNC)
-        assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames + SYNC]
-
-
-@pytest.mark.parametrize("n", [1, 26, 27])
-def test_a_sync_after_other_numbers_of_commands_follows_alone(led: Led, n: int) -> None:
-    batch, _, _ = commands(led, n)
-    batch.send(SYNC)
-    assert led.sent()[-1] == SYNC
-
-
-@pytest.mark.parametrize("n", [1, 27])
-def test_a_single_command_or_more_than_26_are_sent_one_by_one(led: Led, n: int) -> None:
-    batch, _, frames = commands(led, n)
-    batch.send()
-    assert led.sent() == [frames[at : at + 16] for at in range(0, len(frames), 16)]
 
 
 @pytest.mark.parametrize("packet", [b"", bytes(24), bytes(20)], ids=["gone", "24", "20"])
