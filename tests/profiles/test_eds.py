@@ -249,7 +249,7 @@ JUNK = st.text(max_size=12) | st.sampled_from(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_a_damaged_eds_raises_only_profile_errors(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

@@ -161,7 +161,7 @@ ANYTHING = st.one_of(
 KEYS = st.sampled_from([*RobotLimits.model_fields, "torque", ""])
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.dictionaries(KEYS, ANYTHING, max_size=4))
 def test_any_value_of_a_limit_is_read_or_rejected_with_an_error(table: dict[str, object]) -> None:
     arrays = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}

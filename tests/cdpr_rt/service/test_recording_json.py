@@ -24,7 +24,7 @@ def _written(values: list[float]) -> list[float | None]:
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=40))
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_any_number_is_read_back_to_a_billionth(values: list[float]) -> None:
     for value, read in zip(values, _written(values), strict=True):
         if not math.isfinite(value):

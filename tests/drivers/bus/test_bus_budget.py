@@ -16,7 +16,7 @@ from cdpr_profiles import load_drive, load_robot, load_winch
 from cdpr_sim_bus.frame import SFF_BITS
 
 DRIVE = load_drive("generic-cia402")
-repeatable = settings(max_examples=300)
+repeatable = settings(max_examples=100)
 # after the CRC: its delimiter, acknowledge slot and delimiter, end of frame, interframe space
 UNSTUFFED = 1 + 2 + 7 + 3
 

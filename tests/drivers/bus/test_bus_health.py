@@ -63,7 +63,7 @@ def test_losses_are_counted() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.binary(max_size=12)), max_size=20))
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_any_frame_leaves_a_known_state(frames: list[tuple[int, bytes]]) -> None:
     health = BusHealth()
     for can_id, data in frames:

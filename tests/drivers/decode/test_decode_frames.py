@@ -337,7 +337,7 @@ FRAMES = st.tuples(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(st.lists(FRAMES, max_size=60), st.booleans())
 def test_arbitrary_frames_are_decoded_to_printable_text(
     frames: list[tuple[int, bytes, int, int]], known: bool

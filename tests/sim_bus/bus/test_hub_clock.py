@@ -13,7 +13,7 @@ from cdpr_sim_bus.bus.client import BusLoad
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.frame import LONGEST_FRAME_BITS, pack_frame
 
-LAW = settings(max_examples=200)
+LAW = settings(max_examples=100)
 
 
 def test_lockstep_time_stands_still_unless_running() -> None:

@@ -52,7 +52,7 @@ def test_bus_timing_registers_set_the_bit_rate(registers: bytes, right: bool) ->
 
 
 @given(FRAMES)
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_the_text_of_a_frame_sends_the_same_frame(frame: bytes) -> None:
     bench = Bench(b"S8", b"O")
     line = bench.adapter.text_of(frame, 0.0)
@@ -61,7 +61,7 @@ def test_the_text_of_a_frame_sends_the_same_frame(frame: bytes) -> None:
 
 
 @given(st.lists(st.binary(max_size=40), max_size=8))
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_garbage_gets_short_answers(chunks: list[bytes]) -> None:
     bench = Bench(b"S8", b"O")
     for chunk in chunks:
@@ -72,7 +72,7 @@ def test_garbage_gets_short_answers(chunks: list[bytes]) -> None:
 
 
 @given(st.binary(max_size=60), st.lists(st.integers(0, 60), max_size=5))
-@settings(max_examples=200)
+@settings(max_examples=100)
 def test_lines_do_not_depend_on_how_input_is_split(data: bytes, cuts: list[int]) -> None:
     whole = Bench().adapter.lines(data)
     edges = sorted({0, len(data), *(min(cut, len(data)) for cut in cuts)})
