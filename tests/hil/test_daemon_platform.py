@@ -115,27 +115,6 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
     assert "paying out the cables; a platform" in again.stderr
 
 
-def test_a_platform_turns_to_the_given_angle(turning: RealDaemon) -> None:
-    output_of(turning, "tighten")
-    moved = output_of(turning, "move", "--to", "50", "1500", "--rotate", "-5")
-    assert moved["position_m"] == pytest.approx([0.05, 1.5], abs=0.005)
-    assert moved["rotation_rad"] == pytest.approx([math.radians(-5.0)], abs=0.01)
-    turned = output_of(turning, "move", "--rotate", "3", "--relative", "--speed", "200")
-    assert turned["rotation_rad"] == pytest.approx([math.radians(-2.0)], abs=0.01)
-    shown = cdpr("status", *turning.at).stdout
-    assert "target 50.0, 1500.0 mm, turned by -2.00 deg" in shown
-
-    output_of(turning, "move", "--to", "0", "100", "--relative", "--frame", "platform")
-    target_m = turning.status()["program_progress"]["target_m"]
-    way = 0.1 * math.sin(math.radians(2.0)), 0.1 * math.cos(math.radians(2.0))
-    assert target_m == pytest.approx([0.05 + way[0], 1.5 + way[1]], abs=1e-6)
-
-    status, why = refused(turning, "move", "--rotate", "20")
-    assert status == 2
-    assert "--rotate 20: 20 deg from the orientation at home; allowed: up to 15 deg" in why
-    output_of(turning, "lower")
-
-
 def test_poses_are_recorded_for_a_calibration(turning: RealDaemon, tmp_path: Path) -> None:
     read = ("calibrate", "read", "--out", str(tmp_path / "cal"))
     status, why = refused(turning, *read)

@@ -50,20 +50,6 @@ def moved(physics: Physics, targets: tuple[tuple[float, ...], ...]) -> Moved:
     return physics, legs
 
 
-def test_winches_that_swing_at_rest_are_reported_until_notices_are_cleared() -> None:
-    physics = Physics(planar(), RobotPlant())
-    control, feedback = physics.control, physics.feedback
-    at_rest_rad = feedback.position_rad.copy()
-    for k in range(4000):
-        turn = np.sin(2.0 * np.pi * 20.0 * k * PERIOD_S)
-        feedback.position_rad[:] = at_rest_rad + 0.2 * turn
-        control.update(feedback, physics.setpoint, physics.torque)
-    (told,) = control.notices()
-    assert "the control loop oscillates at this winch: for 1 s at 20 Hz" in told
-    control.clear_notices()
-    assert not control.notices()
-
-
 @pytest.fixture(scope="module")
 def in_a_plane() -> Moved:
     """A robot with unidentified motors after motions to targets."""
@@ -184,21 +170,6 @@ def test_updates_retain_no_memory(name: str) -> None:
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     assert grown < 2000
-
-
-def test_a_position_that_tensions_cannot_hold_is_reported() -> None:
-    control = planar().control()
-    control.stand_still()
-    control.position[:] = 0.0, 1.9
-    assert not control.infeasibility(np.array([0.0, 1.9]))
-    assert control.is_feasible(np.array([0.0, 1.9]))
-    for place in ((-1.5, 1.0), (0.0, 2.95), (0.0, 3.5)):
-        told = control.infeasibility(np.array(place))
-        assert "cable" in told
-        assert "reserve" in told
-        assert not control.is_feasible(np.array(place))
-    assert "at " in control.way_infeasibility(np.array([-1.5, 1.0]))
-    assert not control.way_infeasibility(np.array([0.3, 1.6]))
 
 
 def test_an_obstacle_in_the_way_is_reported() -> None:
