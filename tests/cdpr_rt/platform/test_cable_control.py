@@ -17,7 +17,7 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.model.platform_model import platform_model_of
 from cdpr_rt.platform.cable_control import CableControl
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.bench.control import PeriodicMotion, PlainControl, control_of, updates
+from cdpr_tools.bench.control import PeriodicMotion, control_of, updates
 from tests.cdpr_rt.platform.platform_physics import (
     PERIOD_S,
     Physics,
@@ -138,21 +138,6 @@ def test_a_robot_with_high_friction_overshoots_little() -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_the_benchmarks_plain_controller_finds_the_pose_and_pulls_with_all_cables(
-    name: str,
-) -> None:
-    ours = control_of(robot(name))
-    plain, motion = PlainControl(robot(name), ours), PeriodicMotion(robot(name), ours)
-    torques: list[np.ndarray] = []
-    for work in islice(updates(plain, motion, torques), 401):
-        work()
-    wanted = ours.model.pose(motion.position[400])
-    assert np.abs(plain.p - wanted.p).max() < 1e-4
-    pulls = -np.array(torques[-1]) / plain.c
-    assert pulls.min() > 0.0
-
-
-@pytest.mark.parametrize("name", ROBOTS)
 def test_updates_retain_no_memory(name: str) -> None:
     ours = control_of(robot(name))
     motion = PeriodicMotion(robot(name), ours)
@@ -182,18 +167,6 @@ def test_an_obstacle_in_the_way_is_reported() -> None:
     told = control.way_infeasibility(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
     assert "at -50.0, 100.0, 1810.0 mm: platform and obstacle 1 come within 10 mm" in told
     assert not control.way_infeasibility(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
-
-
-def test_an_orientation_that_tensions_cannot_hold_is_reported() -> None:
-    control = spatial().control()
-    assert control.is_feasible(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.1]))
-    assert "cable" in control.infeasibility(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 1.5]))
-
-
-def test_a_target_in_an_exit_point_is_reported() -> None:
-    machine = planar()
-    place = np.subtract(machine.platform.exit_points_m[0], machine.platform.anchor_points_m[0])
-    assert machine.control().infeasibility(place)
 
 
 @pytest.mark.parametrize(("place", "told"), [((0.0, 1.9), False), ((-1.5, 1.0), True)])
