@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon, cdpr, until
 
 import cdpr_rt as api
 from cdpr_profiles import load_winch
@@ -152,3 +152,33 @@ def test_packets_without_key_or_session_move_nothing_while_the_holder_is_silent(
     until(lambda: daemon.status()["parts"]["stream"]["packets"]["unsigned"] == 30)
     assert daemon.status()["program"] == "hold"
     np.testing.assert_allclose(setpoints(daemon), before, atol=1e-4)
+
+
+def test_a_second_daemon_is_rejected_and_a_listener_is_accepted(
+    daemon: RealDaemon, folder: Path
+) -> None:
+    daemon.wait_for("ready")
+    other = folder / "other.sock"
+    told = cdpr("run", daemon.robot, "--bus", daemon.bus, "--socket", other, "--no-record")
+    assert told.returncode == 1
+    assert f"process {daemon.children()['loop']} " in told.stderr
+    assert "or give --read-only to listen" in told.stderr
+    beside = folder / "beside"
+    beside.mkdir()
+    listener = RealDaemon(beside, "--read-only", "--no-record", bus=daemon.bus)
+    try:
+        heard = listener.status()["cycle"]["cycle"]
+        follow(daemon)
+        until(lambda: listener.status()["cycle"]["cycle"] > heard + 100)
+        status = listener.status()
+        assert (status["state"], status["read_only"]) == ("ready", True)
+        held = listener.http.post("/control", json={"client": "x"}).json().get("token", "")
+        refused = listener.http.post(
+            "/enable", json={"program": "hold"}, headers={"X-Control-Token": held}
+        )
+        assert refused.status_code >= 400
+        assert "listens" in refused.text
+        daemon.http.post("/disable", json={})
+    finally:
+        assert listener.end() == 0, listener.errors()
+    assert daemon.wait_for("ready")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing
 
 import canopen
+import numpy as np
 import pytest
 from profile_rig import DRIVES, MixedSimulator, write_winch
 
@@ -51,6 +52,31 @@ def _cycles(group: AxisGroup, count: int, torques_Nm: list[float]) -> None:
         group.command.torque_Nm[:] = torques_Nm
         group.transmit()
         assert alarm(group) == ""
+
+
+def _until(group: AxisGroup, state: State) -> None:
+    group.request(state)
+    for _ in range(200):
+        _cycles(group, 1, [0.0] * group.n)
+        if group.reached(state):
+            return
+    raise AssertionError(group.states())
+
+
+def test_different_drives_follow_torques_in_one_group(mixed: AxisGroup) -> None:
+    modes = mixed.torque_modes
+    assert len(set(modes)) > 1
+    mixed.ask_mode(modes)
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    assert mixed.mode_confirmed()
+    _until(mixed, State.OPERATION_ENABLED)
+    wanted = [0.5, -0.4, 0.3, -0.2][: mixed.n]
+    start = mixed.feedback.position_rad.copy()
+    _cycles(mixed, 10, wanted)
+    assert mixed.feedback.torque_Nm == pytest.approx(wanted, abs=0.02)
+    moved = mixed.feedback.position_rad - start
+    assert np.sign(moved).tolist() == np.sign(wanted).tolist()
+    _until(mixed, State.SWITCH_ON_DISABLED)
 
 
 def test_a_mode_that_one_drive_lacks_is_rejected_with_its_name(mixed: AxisGroup) -> None:
