@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +11,7 @@ from cdpr_drivers.axes.homing import MIRRORED, Homing, HomingStep
 from cdpr_drivers.cia402 import Mode, State
 from cdpr_drivers.errors import DriveFaultError
 from cdpr_sim_bus.cia402.modes import METHODS
-from tests.drivers.axis_rig import DRIVE, Rig, open_rig, start_simulator
+from tests.drivers.axis_rig import DRIVE, Rig, open_rig
 
 COUNT_RAD = math.tau / 8192
 
@@ -40,19 +38,6 @@ def _turn(rig: Rig, torque_Nm: float, seconds: float = 3.0) -> None:
 
 def _turns_apart(a_rad: float, b_rad: float) -> float:
     return abs(math.remainder(a_rad - b_rad, math.tau))
-
-
-@pytest.mark.parametrize("method", [33, 34])
-def test_homing_puts_the_origin_on_the_index_from_either_side(rig: Rig, method: int) -> None:
-    assert _home(rig, method).step is HomingStep.DONE
-    feedback = rig.group.feedback
-    assert feedback.index_known[0]
-    assert feedback.index_rad[0] == 0.0
-    assert abs(feedback.position_rad[0]) < 0.2  # the motor stops just past the index
-    # the probe finds the index at a whole number of turns
-    touch_probe.arm(rig.group, 0)
-    _turn(rig, 0.25)
-    assert _turns_apart(feedback.index_rad[0], 0.0) <= COUNT_RAD
 
 
 def test_the_probe_finds_the_same_index_in_both_directions(rig: Rig) -> None:
@@ -108,31 +93,6 @@ def test_homing_that_takes_too_long_is_halted(rig: Rig) -> None:
     assert rig.group.feedback.position_rad[0] == pytest.approx(still, abs=0.01)
     assert not rig.group.feedback.index_known[0]
     rig.reach(State.SWITCH_ON_DISABLED)
-
-
-@pytest.fixture(scope="module")
-def bus_without_index(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    plant: Path = tmp_path_factory.mktemp("plant") / "no-index.toml"
-    plant.write_text("[encoder]\nindex_present = false\n")
-    simulator = start_simulator(plant=plant)
-    try:
-        yield simulator.bus
-    finally:
-        simulator.stop()
-
-
-def test_homing_to_a_missing_index_is_reported_as_homing_error(bus_without_index: str) -> None:
-    with open_rig(bus_without_index) as rig:
-        with pytest.raises(DriveFaultError, match="homing error"):
-            _home(rig, 33)
-        assert not rig.group.feedback.index_known[0]
-
-
-def test_the_probe_latches_nothing_if_there_is_no_index(bus_without_index: str) -> None:
-    with open_rig(bus_without_index) as rig:
-        touch_probe.arm(rig.group, 0)
-        with pytest.raises(AssertionError):
-            _turn(rig, 0.2, seconds=1.0)
 
 
 def test_arming_a_probe_that_is_not_in_a_pdo_is_an_error(bus: str) -> None:

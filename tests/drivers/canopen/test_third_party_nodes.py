@@ -5,12 +5,14 @@ from __future__ import annotations
 import struct
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import canopen
 import pytest
 
 from cdpr_drivers.canopen.boot import boot
 from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.canopen.sdo import SdoClient
 from cdpr_drivers.errors import BootError, SdoAbortError, SdoTimeoutError
 from tests.drivers.axis_rig import DRIVE, SETTINGS, dictionary, open_network
 from tests.drivers.canopen.scripted_node import Answer, abort, expedited, scripted
@@ -155,7 +157,8 @@ def test_a_faulty_transfer_fails_with_its_reason_and_the_next_one_works(
     kind: type[Exception],
     told: str,
 ) -> None:
-    monkeypatch.setattr("cdpr_drivers.canopen.sdo._MOST_BYTES", 700)
+    send = partial(network.send, 0x600 + FOREIGN_NODE)
+    network.clients[FOREIGN_NODE] = SdoClient(send, network.clock, most_bytes=700)
     waits = kind is SdoTimeoutError
     monkeypatch.setattr("cdpr_drivers.canopen.network.TIMEOUT_S", 1.0 if waits else 60.0)
     with scripted(simulated_bus, FOREIGN_NODE, answer) as node:
