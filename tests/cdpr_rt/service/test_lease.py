@@ -40,46 +40,6 @@ def test_nobody_holds_the_right_at_first_whatever_an_earlier_service_published()
     assert lease.holder() is None
 
 
-def test_renewing_extends_the_published_time() -> None:
-    lease, clock = made()
-    token = lease.take("maria", 2.0)
-    assert until_ns() == clock.ns + 2_000_000_000
-    clock.ns += 1_500_000_000
-    assert lease.renew(token).ttl_s == 2.0
-    assert until_ns() == clock.ns + 2_000_000_000
-
-
-def test_another_client_is_rejected_until_the_holder_has_been_silent() -> None:
-    lease, clock = made()
-    lease.take("maria", 2.0)
-    with pytest.raises(LeaseError, match="maria holds the right to move"):
-        lease.take("jan", 2.0)
-    clock.ns += 2_000_000_001
-    lease.take("jan", 2.0)
-    holder = lease.holder()
-    assert holder is not None
-    assert holder.client == "jan"
-
-
-def test_a_silent_holder_loses_the_right_even_if_nobody_takes_it() -> None:
-    lease, clock = made()
-    token = lease.take("maria", 0.5)
-    clock.ns += 600_000_000
-    with pytest.raises(LeaseError, match="expired: maria was silent"):
-        lease.renew(token)
-    assert until_ns() < clock.ns
-
-
-def test_a_released_right_ends_immediately() -> None:
-    lease, _ = made()
-    token = lease.take("maria", 2.0)
-    lease.release(token)
-    assert until_ns() == 0
-    for wrong in (token, "", None):
-        with pytest.raises(LeaseError):
-            lease.renew(wrong)
-
-
 @pytest.mark.parametrize("ttl_s", [0.0, -1.0, 0.19, 10.01, float("nan"), float("inf")])
 def test_an_invalid_time_to_live_is_rejected(ttl_s: float) -> None:
     lease, _ = made()
