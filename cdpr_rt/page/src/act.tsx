@@ -1,7 +1,9 @@
 // What acts: the stop, the next step, moves and jogging.
 import { useEffect, useState } from "preact/hooks";
+import { linkTo } from "./address";
 import { clientName, command, hasKey, request, setKey, stop as order } from "./daemon";
-import { STEP_LABELS, type Situation, type Step, situationOf } from "./situation";
+import { beginTarget, useHindrance } from "./move";
+import { STEP_LABELS, type Situation, type Step, lastStop, situationOf } from "./situation";
 import { store, useStore } from "./store";
 
 const stop = (): void => {
@@ -54,11 +56,11 @@ const STEPS: Record<Exclude<Step, "move">, () => Promise<unknown>> = {
 };
 
 export function useSituation(): Situation {
-  const { status, description, connected } = useStore();
-  return situationOf(status, description, connected);
+  const { status, description, connected, interrupted } = useStore();
+  return situationOf(status, description, connected, interrupted);
 }
 
-const SETTLE_MS = 500;
+const SETTLE_MS = 500, SHOWN_MS = 100;
 
 /** Return whether a value has not changed for a moment, in which a press may be meant for the one before. */
 function useSettled(value: unknown): boolean {
@@ -77,12 +79,19 @@ export function RejectedMessage() {
   return <p class="rejected" role="alert">{rejected} <button class="plain" onClick={() => store.change({ rejected: "" })}>Close</button></p>;
 }
 
+/** Show the robot and a target there, which the user can type or drag. */
+function beginMove(): void {
+  location.hash = linkTo("robot");
+  if (!store.target) beginTarget(store.description!.platform!);
+  setTimeout(() => document.querySelector<HTMLInputElement>(".target input")?.focus(), SHOWN_MS);
+}
+
 /** The state, its cause and the one next step: the head of every view. */
 export function NextStep() {
   useStore();
   const { tone, title, detail, next } = useSituation();
   const [working, setWorking] = useState(false);
-  const settled = useSettled(next);
+  const settled = useSettled(next), free = useHindrance() === "";
   const press = async (step: Exclude<Step, "move">): Promise<void> => {
     setWorking(true);
     await store.attempt(STEPS[step]);
@@ -94,6 +103,7 @@ export function NextStep() {
         <h1 aria-live="polite">{title}</h1>
         {detail && <p>{detail}</p>}
       </div>
+      {next === "move" && hasKey() && free && <button class="next" onClick={beginMove}>{STEP_LABELS[next]}</button>}
       {next && next !== "move" && hasKey() && <button class="next" disabled={working || !settled} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
       {!hasKey() && <Key />}
     </section>
@@ -123,6 +133,7 @@ export function Simulation() {
   if (!description?.simulated || !hasKey()) return null;
   const inject = (fault: string, at: number): Promise<unknown> => request("POST", "/simulated-fault", { axis: at, fault, client: clientName() });
   const mend = async (): Promise<void> => {
+    if (lastStop(store.status!).fallen) await inject("put-back", 0); // first: cables are mended as long as they then need to be
     for (const number of description.axes.keys()) await inject("mend", number);
   };
   return (
@@ -135,6 +146,8 @@ export function Simulation() {
       </div>
       <div class="row">
         {FAULTS.map(([fault, words]) => <button key={fault} onClick={() => void store.attempt(() => inject(fault, axis))}>{words}</button>)}
+      </div>
+      <div class="row">
         <button onClick={() => void store.attempt(mend)}>Mend everything</button>
         <button onClick={() => void store.attempt(() => inject("put-back", 0))} title="Carry a fallen platform back to its stand">Put the platform back</button>
       </div>

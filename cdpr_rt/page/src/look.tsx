@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
 import { type Border, type Cycle, type DaemonEvent, type Description, hasKey, request } from "./daemon";
-import { anglesOf, go, positionsOf, presentPose, rounded, targetOf, useHindrance } from "./move";
+import { anglesOf, beginTarget, go, positionsOf, rounded, targetOf, useHindrance } from "./move";
 import { type RobotScene, drawnIn, tensionColour } from "./scene";
 import { progressOf } from "./situation";
 import { store, useCycles, useStore } from "./store";
@@ -58,7 +58,7 @@ export function RobotView() {
       {platform && hasKey() && (
         <div class="overlay">
           <button aria-pressed={border !== null} disabled={border === "computing"} onClick={() => void toggle()} title="Show where the cables can hold the platform at rest">{border === "computing" ? "Computing …" : "Workspace"}</button>
-          {!target && free && <button onClick={() => store.change({ target: presentPose(platform) })} title="Drag the arrows of the outline to where the platform is to go">Drag a target</button>}
+          {!target && free && <button onClick={() => beginTarget(platform)} title="Drag the arrows of the outline to where the platform is to go">Drag a target</button>}
           {target && anglesOf(platform).length > 0 && <button aria-pressed={turns} onClick={() => setTurns(!turns)}>Turn</button>}
           {target && <button class="go" disabled={!wanted} onClick={() => go(platform)}>Go there</button>}
           {target && <button onClick={() => store.change({ target: null })}>Discard the target</button>}

@@ -17,6 +17,7 @@ export const anglesOf = (platform: Platform): string[] => platform.controlled.fi
 export function useHindrance(): string {
   const { status, right } = useStore();
   if (status?.state !== "active" || progressOf(status).tight === false) return "The platform can move once the power is on and the cables are tight.";
+  if ((status as { reacting?: string }).reacting !== "none") return "The robot is stopping.";
   if (status.control.procedure) return `The ${status.control.procedure} moves the platform.`;
   return status.control.held && !right.held ? `${status.control.client} has the right to move.` : "";
 }
@@ -51,7 +52,7 @@ export function Move() {
   const run = (program: string, wanted: Record<string, unknown> = {}) => () => void store.attempt(() => right.program(program, wanted));
   const progress = progressOf(status);
   const isMoving = status.program === "pose" && (progress.done ?? 1) < 1;
-  const isHeld = status.program === "hold" && store.interrupted;
+  const isHeld = status.program === "hold" && store.interrupted === "pose";
   return (
     <Moving name="move" title="Move">
       <Target platform={platform} />
@@ -85,17 +86,25 @@ export function presentPose(platform: Platform): string[] | null {
   return progress?.position_m ? [...progress.position_m.map((one) => rounded(1e3 * one, 0)), ...angles.map((one) => rounded(one / RAD, 1))] : null;
 }
 
-export const go = (platform: Platform, share = 100): void => {
+const atSpeed = (platform: Platform): Record<string, number> => (store.speed < 100 ? { speed_m_s: (store.speed / 100) * platform.speed_m_s } : {});
+
+/** Begin a target at the present pose, or at the nearest one in the box of targets. */
+export function beginTarget(platform: Platform): void {
+  const { workspace_min_m: low_m, workspace_max_m: high_m } = platform;
+  const pose = presentPose(platform) ?? [];
+  const within = (value: number, axis: number): number => Math.min(Math.max(value, Math.ceil(1e3 * low_m[axis]!)), Math.floor(1e3 * high_m[axis]!));
+  store.change({ target: pose.map((text, axis) => (axis < low_m.length ? String(within(Number(text), axis)) : text)) });
+}
+
+export const go = (platform: Platform): void => {
   const wanted = store.target && targetOf(platform, store.target);
   if (!wanted) return;
   store.change({ target: null });
   const angles = wanted.rotation_rad.length ? { rotation_rad: wanted.rotation_rad } : {};
-  const speed = share < 100 ? { speed_m_s: (share / 100) * platform.speed_m_s } : {};
-  void store.attempt(() => store.right.program("pose", { position_m: wanted.position_m, ...angles, ...speed }));
+  void store.attempt(() => store.right.program("pose", { position_m: wanted.position_m, ...angles, ...atSpeed(platform) }));
 };
 
 function Target({ platform }: { platform: Platform }) {
-  const [share, setShare] = useState(100);
   const names = [...positionsOf(platform), ...anglesOf(platform)];
   const count = positionsOf(platform).length;
   const shown = store.target ?? presentPose(platform) ?? names.map(() => "");
@@ -104,10 +113,10 @@ function Target({ platform }: { platform: Platform }) {
     const [low, high] = number < count
       ? [1e3 * platform.workspace_min_m[number]!, 1e3 * platform.workspace_max_m[number]!]
       : [-platform.workspace_angle_rad / RAD, platform.workspace_angle_rad / RAD];
-    return `${low.toFixed(0)} to ${high.toFixed(0)}`;
+    return `${low.toFixed(0)} to ${high.toFixed(0)}`.replace(/-/g, "−");
   };
   return (
-    <form onSubmit={(event) => { event.preventDefault(); go(platform, share); }}>
+    <form onSubmit={(event) => { event.preventDefault(); go(platform); }}>
       <div class="target">
         {names.map((name, number) => (
           <label key={name}>
@@ -120,7 +129,7 @@ function Target({ platform }: { platform: Platform }) {
       </div>
       <div class="row">
         <button class="go" disabled={!store.target || !valid}>Go</button>
-        <label>at <select aria-label="Speed" value={share} onChange={(event) => setShare(Number(event.currentTarget.value))}>
+        <label>at <select aria-label="Speed" value={store.speed} onChange={(event) => store.change({ speed: Number(event.currentTarget.value) })}>
           {SHARES.map((one) => <option key={one} value={one}>{(0.01 * one * platform.speed_m_s * 1e3).toFixed(0)} mm/s</option>)}
         </select></label>
         {Object.entries(platform.poses_m).map(([name, at]) => (
@@ -139,7 +148,7 @@ function Jog({ platform }: { platform: Platform }) {
   const outside = isOutside(platform, STEPS_MM[size]! / 1e3);
   const jog = (key: "distance_m" | "turn_rad", count: number, number: number, step: number): void => {
     const wanted = Array.from({ length: count }, (_, one) => (one === number ? step : 0));
-    void store.attempt(() => store.right.program("pose", { [key]: wanted, frame }));
+    void store.attempt(() => store.right.program("pose", { [key]: wanted, frame, ...atSpeed(platform) }));
   };
   const pair = (name: string, key: "distance_m" | "turn_rad", count: number, number: number, step: number, words: string) => (
     <div class="jog" key={name}>

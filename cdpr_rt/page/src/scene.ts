@@ -16,8 +16,7 @@ const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Colo
 /** Opacity of the platform, if its pose is known and if not. */
 const SURE = 0.9, UNSURE = 0.3;
 const UP = new Vector3(0, 1, 0);
-const SLOW_MS = 12, SHARE = 4;
-const PIXEL = new Uint8Array(4);
+const LOOK_MS = 4, SLOW_MS = 25, SHARE = 4;
 const SMALLEST_BODY_M = 0.04;
 
 /** A point of the robot's file as a vector; in a plane the third coordinate is 0. */
@@ -357,15 +356,21 @@ export class RobotScene {
     requestAnimationFrame(() => {
       const began = performance.now();
       this.#renderer.render(this.#scene, this.#camera);
-      const gl = this.#renderer.getContext();
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, PIXEL); // waits for the picture; finish() does not
-      const cost_ms = performance.now() - began;
-      // without a graphics processor a picture takes long: leave most of the time to the rest of the page
-      setTimeout(() => {
-        this.#asked = false;
-        if (this.#again) this.#draw();
-        this.#again = false;
-      }, cost_ms > SLOW_MS ? SHARE * cost_ms : 0);
+      const gl = this.#renderer.getContext() as WebGL2RenderingContext;
+      const drawn = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+      gl.flush();
+      const look = (): void => { // nothing here waits for the picture: a stop must not
+        const cost_ms = performance.now() - began;
+        if (drawn && gl.getSyncParameter(drawn, gl.SYNC_STATUS) === gl.UNSIGNALED) return void setTimeout(look, LOOK_MS);
+        gl.deleteSync(drawn);
+        // without a graphics processor a picture takes long: leave most of the time to the rest of the machine
+        setTimeout(() => {
+          this.#asked = false;
+          if (this.#again) this.#draw();
+          this.#again = false;
+        }, cost_ms > SLOW_MS ? SHARE * cost_ms : 0);
+      };
+      setTimeout(look);
     });
   }
 }

@@ -30,6 +30,7 @@ const STAGES: Record<string, string> = {
   "tighten back": "Returning to the first tensions",
   "tighten lengths": "Measuring the cable lengths",
   "tighten index": "Searching the index of each motor",
+  "tighten held": "Settling on tight cables",
   "lower home": "Moving home, above the stand",
   "lower down": "Lowering the platform",
   "lower fade": "Slackening the cables",
@@ -73,7 +74,7 @@ interface LastStop {
   broken: string[];
 }
 
-const lastStop = (status: Status): LastStop =>
+export const lastStop = (status: Status): LastStop =>
   ((status as { last_stop?: LastStop | null }).last_stop ?? { fallen: false, broken: [] });
 
 const sentence = (text: string): string => {
@@ -87,68 +88,83 @@ const situation = (tone: Tone, title: string, detail = "", next: Step | null = n
   tone, title, detail: sentence(detail), next,
 });
 
-export function situationOf(status: Status | null, description: Description | null, connected: boolean): Situation {
+/** `interrupted` names the program that was stopped before its end. */
+export function situationOf(status: Status | null, description: Description | null, connected: boolean, interrupted: string): Situation {
   if (!connected && !hasKey()) return situation("off", "This page needs its key", "Open the address that `cdpr page` prints, or enter the key");
   if (!connected || !status) return situation("off", "No connection", "The daemon does not answer. This page keeps trying");
   switch (status.state) {
     case "starting": return situation("busy", "Starting", "The control loop is starting");
     case "dead": return situation("fault", "The control loop has ended", `${status.reason}. Start it again with \`cdpr run\``);
-    case "fault": return faultOf(status);
+    case "fault": return faultOf(status, description);
     case "unconfigured": return status.released
       ? situation("busy", "A procedure runs the drives", "The control loop takes them again when it ends")
       : situation("off", "Drives not booted", status.reason, "configure");
     case "inactive": return situation("off", "No power", status.reason || "The drives are booted", "check");
     case "ready": return status.read_only
       ? situation("ready", "Listening only", status.reason || "Another master moves this robot")
-      : readyOf(status);
-    case "active": return activeOf(status, description);
+      : readyOf(status, description);
+    case "active": return activeOf(status, description, interrupted);
     default: return situation("off", status.state, status.reason);
   }
 }
 
-function faultOf(status: Status): Situation {
+const MEND = "Mend everything, in the card Break the simulation, repairs the cables and puts the platform back";
+
+/** What to do about cables that seem broken; their texts begin with the name of the axis. */
+function repairOf(broken: string[], description: Description | null): string {
+  if (description?.simulated) return MEND;
+  return `Repair before you enable: ${broken.map((one) => one.split(":")[0]).join(", ")}`;
+}
+
+function faultOf(status: Status, description: Description | null): Situation {
   const texts = status.faults.map((fault) => (fault as { text: string }).text);
   const [cause = status.reason, ...others] = texts;
-  const repair = lastStop(status).broken.length ? "Repair the cable, then acknowledge" : "Remove the cause, then acknowledge";
+  const { broken } = lastStop(status);
+  const repair = broken.length && description?.simulated ? `${MEND}. Then acknowledge` : `${broken.length ? "Repair the cable" : "Remove the cause"}, then acknowledge`;
   const detail = others.length ? `${repair}. After it: ${others.join("; ")}` : repair;
   return situation("fault", `Fault: ${cause}`, detail, "acknowledge");
 }
 
-function readyOf(status: Status): Situation {
+function readyOf(status: Status, description: Description | null): Situation {
   const { fallen, broken } = lastStop(status);
   const [, who] = /^disable by (.*)$/.exec(status.commanded ?? "") ?? [];
   const why = /right to move/.test(status.reason) ? "" : status.reason;
   const words = [why, who && `${who} has switched the power off`];
-  if (broken.length) words.push("Repair the cable before you enable");
+  if (broken.length) words.push(repairOf(broken, description));
   else if (fallen) words.push("The platform has come down: look at it before you enable");
   return situation("ready", "No power", words.filter(Boolean).join(". ") || "The drives are ready. Keep clear of the robot", "enable");
 }
 
-function activeOf(status: Status, description: Description | null): Situation {
+function activeOf(status: Status, description: Description | null, interrupted: string): Situation {
   const progress = progressOf(status);
   if ((status as { reacting?: string }).reacting !== "none") return situation("busy", "Stopping", status.reason);
   const stage = STAGES[`${status.program} ${progress.path?.stage ?? progress.stage ?? ""}`];
-  if (status.program === "tighten" && progress.tight === false) return situation("busy", stage ?? "Tightening", progress.trouble);
+  if (description && status.program === "tighten" && progress.tight === false) {
+    if (progress.trouble) return situation("busy", "The cables are not tight", progress.trouble.split("; before that, ")[0], slackOf(status, description).next);
+    return situation("busy", stage ?? "Tightening", "Keep clear of the robot");
+  }
   if (status.program === "lower") {
     return (progress.done ?? 0) < 1
       ? situation("busy", stage ?? "Lowering the platform", progress.trouble)
       : situation("ready", "On its stand", "The cables are loose, the power is on", "tighten");
   }
-  if (description?.platform && progress.tight === false) return slackOf(status);
-  if (status.program === "path" && progress.path?.waiting) return situation("on", "Paused on the path", progress.path.waiting);
+  if (description?.platform && progress.tight === false) return slackOf(status, description);
+  if (status.program === "path" && progress.path?.waiting) return situation("on", "Paused on the path", progress.path.waiting === "paused" ? "Resume it in the card Path" : progress.path.waiting);
   if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
     return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);
   }
   const isLost = /right to move/.test(status.reason);
-  const detail = progress.trouble || status.failure || (isLost ? "The page or program that led the last motion no longer has the right to move. The robot holds" : status.reason);
-  return situation("on", description?.platform ? "Holding the platform" : "Holding", detail, "move");
+  const lost = interrupted ? "The page or program that led the last motion no longer has the right to move. The robot holds" : "";
+  const detail = progress.trouble || status.failure || (isLost ? lost : status.reason);
+  if (!description?.platform) return situation("on", "Holding", detail);
+  return situation("on", "Holding the platform", detail || "Ready to move: enter a target, drag one in the picture, or choose a path", "move");
 }
 
-function slackOf(status: Status): Situation {
+function slackOf(status: Status, description: Description): Situation {
   const { fallen, broken } = lastStop(status);
   const unsure = fallen || broken.length > 0;
   const detail = unsure
     ? "The cables are slack. Put the platform on its stand, upright, then tighten from there"
     : status.failure || "The cables are slack";
-  return situation("ready", "Power on", detail, unsure ? "tighten-home" : "tighten");
+  return situation("ready", "Power on", unsure && description.simulated ? `${MEND}. Then tighten` : detail, unsure ? "tighten-home" : "tighten");
 }

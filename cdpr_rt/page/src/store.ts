@@ -19,8 +19,10 @@ class Store {
   path: Planned | null = null;
   /** Whether a procedure of this page runs. */
   procedure = false;
-  /** Whether the last move was stopped before its end. */
-  interrupted = false;
+  /** The speed of moves and steps, in percent of the robot's. */
+  speed = 100;
+  /** The program that runs or was stopped before its end; "" if it has ended. */
+  interrupted = "";
   /** The cycles of the last `KEPT_S`, so that a view that is opened has curves. */
   readonly recent: Cycle[] = [];
   readonly right = new Right();
@@ -30,7 +32,7 @@ class Store {
 
   constructor() {
     this.right.changed = () => this.change();
-    this.right.lost = (why) => this.change({
+    this.right.lost = (why) => (document.hidden || this.interrupted || this.procedure) && this.change({
       rejected: document.hidden
         ? "While this page was in the background, its browser slowed it down. So the page lost the right to move; a motion would have held. The next step takes the right again."
         : `This page has lost the right to move${why ? `: ${why}` : ""}. The next step takes it again.`,
@@ -52,7 +54,7 @@ class Store {
     });
   }
 
-  change(values: Partial<Pick<Store, "status" | "description" | "events" | "connected" | "rejected" | "target" | "path">> = {}): void {
+  change(values: Partial<Pick<Store, "status" | "description" | "events" | "connected" | "rejected" | "target" | "path" | "speed">> = {}): void {
     Object.assign(this, values);
     this.#listeners.forEach((listener) => listener());
   }
@@ -62,8 +64,8 @@ class Store {
     const progress = progressOf(status);
     const moves = status.state === "active" && (progress.done ?? 1) < 1;
     if (document.hidden && (moves || this.procedure)) this.right.renew();
-    if (status.program === "pose" && progress.target_m) this.interrupted = (progress.done ?? 1) < 1;
-    else if (status.program !== "hold" || status.state !== "active") this.interrupted = false;
+    if (status.state !== "active") this.interrupted = "";
+    else if (status.program !== "hold") this.interrupted = (progress.done ?? 1) < 1 ? status.program ?? "" : "";
     const plan = progress.path?.plan;
     if (plan && plan !== this.#asked && plan !== this.path?.plan) {
       this.#asked = plan;
