@@ -407,7 +407,8 @@ def _report_ready(report: dict[str, Any], url: str, out: Output) -> None:
         out.say(f"page {url}")
     out.say(f"socket {report['socket']}; Ctrl-C ends it")
     if report["state"] == "ready":
-        out.say("next: `cdpr enable` in a second terminal")
+        page = "*Enable* on the page, or " if url else ""
+        out.say(f"next: {page}`cdpr enable` in a second terminal")
 
 
 def _ended(reason: str, status: int) -> CommandError:

@@ -75,7 +75,7 @@ class _DescribingProcess:
         except TimeoutError:
             self.end()
             raise DescribingError(
-                f"this takes longer than {_DESCRIBING_S:g} s; check the values"
+                f"this takes longer than {_DESCRIBING_S:g} s: is the machine busy? check values"
             ) from None
         except asyncio.CancelledError:  # its answer must not reach the next request
             self.end()

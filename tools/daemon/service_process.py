@@ -288,6 +288,8 @@ def inject_fault(settings: RunSettings, axis: int, fault: str) -> str:
             amount = access.inject(fault, None)
     except (CommandError, ProfileError) as error:
         raise InjectionError(str(error)) from None
+    if fault == "put-back":
+        return "platform put back"
     return f"{one.name}: {FAULTS[fault].text(amount) if fault in FAULTS else 'mended'}"
 
 

@@ -48,6 +48,7 @@ export function Commission() {
             </li>
             <li>
               <button class="go" disabled={!ready} onClick={begin}>Commission{chosen.length ? ` ${chosen.join(", ")}` : ""}</button>
+              {!chosen.length ? <p class="quiet">Choose a motor first.</p> : !detached && <p class="quiet">Confirm that its cable is off.</p>}
               {powered && <p class="fault">Switch the power off first: the motors are in use.</p>}
             </li>
           </ol>

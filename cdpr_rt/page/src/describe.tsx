@@ -49,6 +49,7 @@ export function Describe() {
   const [shown, setShown] = useState<Described | null>(null);
   const [diagnosis, setDiagnosis] = useState<Described | null>(null);
   const [why, setWhy] = useState("");
+  const [tries, setTries] = useState(0);
   const asked = useRef(0);
 
   const answer = (values: Answers): void => {
@@ -60,10 +61,10 @@ export function Describe() {
     const timer = setTimeout(() => void (async () => {
       try {
         setDiagnosis(null);
+        setWhy("");
         const form = await request<Described>("POST", "/robot-file", { answers });
         if (mine !== asked.current) return;
         setShown(form);
-        setWhy("");
         const found = await request<Described>("POST", "/robot-file", { answers, diagnose: true });
         if (mine === asked.current) setDiagnosis(found);
       } catch (error) {
@@ -72,7 +73,7 @@ export function Describe() {
       }
     })(), PAUSE_MS);
     return () => clearTimeout(timer);
-  }, [JSON.stringify(answers)]);
+  }, [JSON.stringify(answers), tries]);
 
   const fromPresent = (): Promise<void> => store.attempt(async () => {
     const form = await request<Described>("POST", "/robot-file", { answers: {}, present: true });
@@ -91,14 +92,14 @@ export function Describe() {
             <Present start={() => void fromPresent()} />
           </div>
           {(shown?.notes?.length ?? 0) > 0 && <p class="busy">The form leaves out of the present robot: {shown!.notes!.join(", ")}. Add them to the file.</p>}
-          {why && <p class="fault" role="alert">{why}</p>}
+          {why && <p class="fault" role="alert">{why} <button class="plain" onClick={() => setTries(tries + 1)}>Try again</button></p>}
           {!shown && !why && <p class="quiet">Starting the computation. This takes some seconds.</p>}
         </section>
         {shown && <Form questions={shown.questions ?? []} answers={answers} answer={answer} />}
       </div>
       <div class="column picture">
         {shown && <Picture platform={shown.platform as unknown as Platform} />}
-        <Diagnosis found={diagnosis} questions={shown?.questions ?? []} />
+        {!why && <Diagnosis found={diagnosis} questions={shown?.questions ?? []} />}
         {shown && <File shown={shown} answers={answers} />}
       </div>
     </div>

@@ -10,7 +10,7 @@ import { curveColour } from "./trend";
 import "./data.css";
 
 const SPANS_S = [1, 2, 5, 10, 20, 40];
-const DRAW_MS = 100;
+const DRAW_MS = 100, SHARE = 2;
 const POINTS = 6000;
 const MOST_CURVES = 24;
 const NONE: Samples = { time_s: [], values: [] };
@@ -130,12 +130,13 @@ function useLive(on: boolean, ids: string, curves: ScopeCurve[], trigger: Trigge
   wanted.current = { trigger, span_s, paused };
   useEffect(() => {
     if (!on || !curves.length) return;
-    let drawn = 0;
+    let drawn = 0, cost_ms = 0;
     setPaused(false);
     const made = (feed.current = new LiveFeed(curves, feed.current, () => {
       const { trigger, span_s, paused } = wanted.current, now = performance.now();
-      if (paused || now - drawn < DRAW_MS) return;
+      if (paused || now - drawn < Math.max(DRAW_MS, SHARE * cost_ms)) return; // a slow machine has time for a stop, too
       drawn = now;
+      requestAnimationFrame(() => setTimeout(() => (cost_ms = performance.now() - now)));
       const window = made.window(trigger, span_s);
       setText(made.refused ? `${made.refused}.` : trigger.mode === "off" ? "" : window ? `Triggered at ${made.triggered_s!.toFixed(3)} s` : "Waiting for the trigger");
       if (!window) return;

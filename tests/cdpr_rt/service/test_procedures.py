@@ -188,6 +188,13 @@ async def _recover(how: str) -> None:
         assert runner.job()["error"] == "ended: its service was killed"
 
 
+ENDS_SLOWLY = """
+import os, pathlib, signal, sys, time
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+print(os.environ["TOKEN"], file=sys.stderr, flush=True)
+while not pathlib.Path(sys.argv[1], "done").exists():
+    time.sleep(0.01)
+"""
 MOVES = """
 import os, sys
 print(os.environ["TOKEN"], file=sys.stderr, flush=True)
@@ -219,6 +226,28 @@ def test_while_a_procedure_moves_the_robot_its_client_cannot(rig: Rig, tmp_path:
         wait_for(lambda: not job(rig)["running"])
         assert jog(lent).status_code == 409
         assert jog(token).status_code == 200
+    rig.service.procedures.plan = None
+
+
+def test_a_procedure_that_was_stopped_moves_the_robot_no_more_while_it_ends(
+    rig: Rig, tmp_path: Path
+) -> None:
+    command = (sys.executable, "-c", ENDS_SLOWLY, str(tmp_path))
+    rig.service.procedures.plan = lambda _: Procedure(
+        "measurement of poses", (command,), "TOKEN", tmp_path, moves=True
+    )
+    with in_control(rig) as token:
+        assert ask(rig, COMMISSION, **token).status_code == 200
+        wait_for(lambda: job(rig)["lines"])
+        lent = {**RIGHT, "X-Control-Token": job(rig)["lines"][0]}
+        assert httpx.post(f"{rig.guarded_url}/hold", headers=RIGHT).status_code == 200
+        body = {"program": "jog", "wanted": {}}
+        answer = httpx.post(f"{rig.guarded_url}/program", json=body, headers=lent)
+        assert answer.status_code == 409
+        assert "stops under control" in answer.json()["error"]
+        assert job(rig)["running"]
+        (tmp_path / "done").touch()
+        wait_for(lambda: not job(rig)["running"])
     rig.service.procedures.plan = None
 
 
