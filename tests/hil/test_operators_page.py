@@ -219,7 +219,9 @@ def test_a_held_enter_key_presses_a_button_once(
     with opened(browser, address(daemon)) as page:
         see(page, "Holding the platform")
         before = moves()
-        page.get_by_role("button", name="x plus 10 mm").focus()
+        step = page.get_by_role("button", name="x plus 10 mm")
+        playwright_api.expect(step).to_be_enabled()
+        step.focus()
         for _ in range(3):
             page.keyboard.down("Enter")
         page.keyboard.up("Enter")
