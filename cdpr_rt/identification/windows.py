@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import scipy
@@ -179,6 +180,15 @@ class Windows:
     cruise_rad_s: float
     """The run's highest set-point speed."""
 
+    @cached_property
+    def average(self) -> Any:
+        """The sparse matrix (r, samples) whose product with samples are the windows' averages."""
+        rows, last = self.torque_Nm.size, self.angle_rad.size - 1
+        places = np.arange(rows)[:, None] * self.stride + np.arange(self.bump.size)
+        first = np.arange(rows + 1) * self.bump.size
+        weights = np.tile(self.bump, rows), np.minimum(places, last).ravel(), first
+        return scipy.sparse.csr_array(weights, shape=(rows, last + 1))
+
 
 def contiguous(runs: Sequence[SweepData]) -> list[SweepData]:
     """Split runs at jumps of time and at reversals of the set-point."""
@@ -321,51 +331,6 @@ def _bump(stride: int, thin: int) -> FloatArray:
     return np.convolve(weights, _SAMPLED, mode="same") if thin == 1 else weights
 
 
-def average(values: FloatArray, windows: Windows, first: int, last: int) -> FloatArray:
-    """Return the windows' averages of values at the thinned samples, (rows, columns)."""
-    out = np.zeros((last - first, values.shape[1]))
-    _average(values, windows.bump, windows.stride, first, out)
-    return out
-
-
-def average_by_sign(values: FloatArray, windows: Windows, rows: IntArray, out: FloatArray) -> None:
-    """Write some windows' averages of `values` (samples,): positive ones to column 0, others to 1.
-
-    In each column the other values count as zero.
-    """
-    _average_by_sign(values, windows.bump, windows.stride, rows, out)
-
-
-@jit
-def _average_by_sign(
-    values: FloatArray, bump: FloatArray, stride: int, rows: IntArray, out: FloatArray
-) -> None:
-    last = values.size - 1
-    for i in range(rows.size):
-        start = rows[i] * stride
-        above, below = 0.0, 0.0
-        for k in range(bump.size):
-            share = bump[k] * values[min(start + k, last)]
-            if share > 0.0:
-                above += share
-            else:
-                below += share
-        out[i, 0], out[i, 1] = above, below
-
-
-@jit
-def _average(
-    values: FloatArray, bump: FloatArray, stride: int, first: int, out: FloatArray
-) -> None:
-    last = values.shape[0] - 1
-    for row in range(out.shape[0]):
-        start = (first + row) * stride
-        for k in range(bump.size):
-            place = min(start + k, last)
-            for column in range(out.shape[1]):
-                out[row, column] += bump[k] * values[place, column]
-
-
 # The friction curve's shape: Stribeck speed and height, and its relaxation length. Friction
 # follows its steady curve g(v) = 1 + rise·exp(-(v/speed)²), relative to Coulomb friction, only
 # after a short sliding distance, as in the LuGre model (Canudas de Wit et al., 1995). Over a
@@ -444,9 +409,7 @@ class FrictionRun:
     @cached_property
     def speed_rad_s(self) -> FloatArray:
         """Mean velocity in each of the rows."""
-        w = self.windows
-        means = average(w.velocity_rad_s[:, np.newaxis], w, 0, w.torque_Nm.size)
-        return np.asarray(means[self.rows, 0])
+        return np.asarray((self.windows.average @ self.windows.velocity_rad_s)[self.rows])
 
     @cached_property
     def slid_rad(self) -> FloatArray:
@@ -455,12 +418,9 @@ class FrictionRun:
 
     def regressors(self, shape: FrictionShape) -> FloatArray:
         """Return forward friction, backward friction and velocity of the rows, (rows, 3)."""
-        w = self.windows
-        friction = relative_friction(self.slid_rad, w.velocity_rad_s, shape)
-        out = np.zeros((self.rows.size, 3))
-        average_by_sign(friction, w, self.rows, out)
-        out[:, 2] = self.speed_rad_s
-        return out
+        friction = relative_friction(self.slid_rad, self.windows.velocity_rad_s, shape)
+        both = np.column_stack([np.maximum(friction, 0.0), np.minimum(friction, 0.0)])
+        return np.column_stack([(self.windows.average @ both)[self.rows], self.speed_rad_s])
 
 
 def fit_shape(
@@ -531,7 +491,7 @@ def _residuals(
 
 # Design matrix of the regression over windows, and its normal equations by kind of row.
 
-_CHUNK = 1024
+_CHUNK, _WAVES = 1024, 256
 _DESIGN_QUICK_rad_s = 1.0
 
 INERTIA, LATENCY = 0, 1
@@ -594,46 +554,27 @@ class Equations:
     parts: Normal
 
 
-@jit
-def _harmonics(
-    angle: FloatArray,
-    bump: FloatArray,
-    stride: int,
-    first: int,
-    orders: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Add the windows' averages of sines and cosines to the columns from FIXED on."""
-    rows = out.shape[0]
-    waves = np.zeros(2 * orders.size)
-    for s in range(first * stride, (first + rows + 4) * stride):
-        if s >= angle.size:
-            break
-        c1, s1 = np.cos(angle[s]), np.sin(angle[s])
-        c, d, last = 1.0, 0.0, 0.0
-        block = s // stride
-        for j in range(orders.size):
-            ahead = orders[j] - last
-            last = orders[j]
-            if ahead == 1.0:
-                c, d = c * c1 - d * s1, d * c1 + c * s1
-            else:
-                c, d = np.cos(last * angle[s]), np.sin(last * angle[s])
-            waves[2 * j], waves[2 * j + 1] = c, d
-        for r in range(max(block - 4, first), min(block, first + rows - 1) + 1):
-            w = s - r * stride
-            if w <= 4 * stride:
-                for column in range(waves.size):
-                    out[r - first, FIXED + column] += bump[w] * waves[column]
+def _harmonics(windows: Windows, orders: Sequence[int], first: int, last: int) -> FloatArray:
+    """Return the windows' averages of cosines and sines, (last - first, 2 orders)."""
+    out = np.zeros((last - first, 2 * len(orders)))
+    if not orders:
+        return out
+    for begin in range(first, last, _WAVES):  # in parts, because all waves together are large
+        end = min(begin + _WAVES, last)
+        samples = slice(begin * windows.stride, (end + 4) * windows.stride)
+        wave = np.exp(1j * windows.angle_rad[samples, None])
+        waves = np.cumprod(np.repeat(wave, max(orders), axis=1), axis=1)[:, np.array(orders) - 1]
+        means = windows.average[begin:end, samples] @ waves
+        out[begin - first : end - first, ::2] = means.real
+        out[begin - first : end - first, 1::2] = means.imag
+    return out
 
 
 def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> FloatArray:
     """Return the regression's columns for windows `first` up to `last`, (last - first, columns)."""
     rows = slice(first, last)
     out = np.zeros((last - first, layout.columns))
-    _harmonics(
-        windows.angle_rad, windows.bump, windows.stride, first, np.array(layout.orders, float), out,
-    )  # fmt: skip
+    out[:, FIXED:] = _harmonics(windows, layout.orders, first, last)
     if windows.quasi_static:
         out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
         out[:, CREEP + 1] = np.minimum(windows.direction[rows], 0.0)
@@ -646,7 +587,7 @@ def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> Flo
     slid = sliding(windows.angle_rad, windows.play_rad)
     friction = relative_friction(slid, windows.velocity_rad_s, layout.shape)
     values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), windows.velocity_rad_s)
-    out[:, COULOMB : VISCOUS + 1] = average(np.column_stack(values), windows, first, last)
+    out[:, COULOMB : VISCOUS + 1] = windows.average[rows] @ np.column_stack(values)
     return out
 
 

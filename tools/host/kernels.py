@@ -128,8 +128,6 @@ def _identification() -> None:
         cut = windows.cut(run, 0.0)
         assert cut is not None  # the run lasts long enough
         windows.matrix(cut, windows.ColumnLayout((1, 4), windows.STARTS[0]), 0, 2)
-        rows = np.zeros(1, np.int64)
-        windows.average_by_sign(cut.angle_rad, cut, rows, np.zeros((1, 2)))
 
 
 def _buses() -> None:
