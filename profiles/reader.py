@@ -93,9 +93,20 @@ def validated(path: Path, table: Mapping[str, Any], model: type[_M]) -> _M:
         raise _refused(path, model, error) from None
 
 
-def _refused(path: Path, model: type[BaseModel], error: ValidationError) -> ProfileError:
-    """Return the first faults of a validation as one error."""
-    found = list(islice(_faults(model, error.errors(include_url=False)), _MOST_FAULTS + 1))
+def validated_cells(path: Path, line: int, cells: Mapping[str, str], model: type[_M]) -> _M:
+    """Return the cells in a line of a CSV file as an instance of `model`; raises ProfileError."""
+    try:
+        return model.model_validate_strings(cells)
+    except ValidationError as error:
+        raise _refused(path, model, error, f"line {line}: ") from None
+
+
+def _refused(
+    path: Path, model: type[BaseModel], error: ValidationError, before: str = ""
+) -> ProfileError:
+    """Return the first faults of a validation as one error; `before` is put before their keys."""
+    faults = _faults(model, error.errors(include_url=False))
+    found = [(before + key, problem) for key, problem in islice(faults, _MOST_FAULTS + 1)]
     key, problem = found[0]
     further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in found[1:_MOST_FAULTS]]
     if len(found) > _MOST_FAULTS:

@@ -35,15 +35,18 @@ from cdpr_rt.calibration.outcome import LEAST_POINTS, CalibrationMethod, Outcome
 from cdpr_rt.calibration.parameters import DRUM, EXIT, CableGeometry
 from cdpr_rt.calibration.readings import Images, Observations
 from cdpr_rt.calibration.residuals import encoder_lengths
-from cdpr_rt.calibration.verdict import (
+from cdpr_rt.calibration.verification import (
+    LEAST_POSES,
     Predicted3Sigma,
     absolute_3_sigma,
     change_of,
+    held_out,
+    hold_out,
     open_directions,
     predicted_3_sigma,
     require_enough,
+    with_more_poses,
 )
-from cdpr_rt.calibration.verification import LEAST_POSES, held_out, hold_out, with_more_poses
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.model.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.model.robot_arrays import limits_of

@@ -138,49 +138,26 @@ def correlated(left: FloatArray, noise: FloatArray, yielding: float) -> FloatArr
     return np.asarray(yielding**2 * np.einsum("jap,jab,jbq->pq", left, across, left, optimize=True))
 
 
-def spurious_information(hats: FloatArray, noise: FloatArray, information: float) -> float:
-    """Return the spurious information n.
-
-    `hats` (N, n, n) are the hat matrices of lengths, `noise` is S.
-    """
-    spare = np.eye(noise.shape[1]) - hats
-    spurious = float((spare * noise).sum())
-    return most_taken_out(max(spurious, 0.0), information)
-
-
 def most_taken_out(wanted: float, information: float) -> float:
     """Return how much may be subtracted from the information I about κ, so that enough is left."""
     return min(wanted, _MOST_SHARE * information)
 
 
-@dataclass(frozen=True)
-class Elongations:
-    """Elongations if true tensions scatter about given ones, and for the opposite case."""
-
-    by_set: float
-    """1 + κ in the first case; `by_true` is that of the second."""
-    by_true: float
-    share: float
-    """Probability of the second case, given the prior of κ."""
-    taken_out: float
-    """q for which the fit finds the weighted mean of both."""
-
-    def off(self, elongation: float) -> float:
-        """Return the root mean square error of κ."""
-        one, other = 1.0 + elongation - self.by_set, 1.0 + elongation - self.by_true
-        return math.sqrt((1.0 - self.share) * one**2 + self.share * other**2)
-
-
-def elongations(
+def mean_of_cases(
     elongation: float, known_std: float, spurious: float, information: float, taken_out: float
-) -> Elongations:
-    """Return both cases for κ, found with q `taken_out`; `spurious` is n, `information` I."""
+) -> tuple[float, float]:
+    """Return q for which the fit finds the weighted mean of both cases, and the rms error of κ.
+
+    κ was found with q `taken_out`; `spurious` is n, `information` I.
+    """
     by_set = (1.0 + elongation) * (information - taken_out) / information
     by_true = by_set * information / (information - spurious)
     less_likely = ((by_true - 1.0) ** 2 - (by_set - 1.0) ** 2) / (2.0 * known_std**2)
     share = float(expit(-less_likely))
     mean = information - spurious + share * spurious
-    return Elongations(by_set, by_true, share, information * share * spurious / mean)
+    one, other = 1.0 + elongation - by_set, 1.0 + elongation - by_true
+    off = math.sqrt((1.0 - share) * one**2 + share * other**2)
+    return information * share * spurious / mean, off
 
 
 def without(covariance: FloatArray, k: int, taken_out: float) -> FloatArray:
@@ -222,7 +199,7 @@ class Fit:
     parameters, and further poses do not reduce it."""
     slope_noise: float
     """Value of `Knowledge.slope_noise` with which a further fit reaches the elongation of
-    `elongations`."""
+    `mean_of_cases`."""
     at: Linearised
     """Residuals and derivatives of geometry and jumps at the result, without the robust loss."""
     weights: FloatArray
@@ -516,14 +493,15 @@ class _Search:
         if geometry.shared:
             k = geometry.size - 1
             information = 1.0 / float(covariance[k, k])
-            spurious = spurious_information(hats, noise, information)
+            spurious = float(((np.eye(geometry.n) - hats) * noise).sum())
+            spurious = most_taken_out(max(spurious, 0.0), information)
             out = most_taken_out(self._taken_out, information)
-            either = elongations(
+            wanted, error = mean_of_cases(
                 geometry.elongation, float(self._known[k]), spurious, information, out
             )
-            slope_noise = either.taken_out / self._seen.poses
+            slope_noise = wanted / self._seen.poses
             covariance = without(covariance, k, out)
-            off = covariance[:, k] * (either.off(geometry.elongation) / float(covariance[k, k]))
+            off = covariance[:, k] * (error / float(covariance[k, k]))
             spread[k, k] += out
         covariance = covariance + covariance @ spread @ covariance
         return covariance, off, slope_noise

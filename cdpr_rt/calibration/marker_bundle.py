@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, orth
 from scipy.sparse import csr_array
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray, rms
@@ -342,24 +342,28 @@ class Bundle:
 
     @property
     def shape_sigma_m(self) -> FloatArray:
-        """Standard deviations of the markers' positions, (m, 3), in the frame that fits all best.
-
-        They belong to the part of the covariance C that no rigid motion of the map explains: P C P
-        with P = 1 - G (G^T G)^-1 G^T, where G are the derivatives of the positions by the six rigid
-        motions. In the frame of a single marker, the uncertain tilt of its sheet would add errors
-        in proportion to the distance.
-        """
-        placed = np.flatnonzero(self.estimate.map.placed)
-        at = self.estimate.map.position_m[placed]
+        """`relative_std` of the markers' positions, (m, 3); nan for markers without a place."""
+        map_ = self.estimate.map
+        placed = np.flatnonzero(map_.placed)
         rows = (LENS_PARAMETERS + 6 * placed[:, None] + np.arange(3)).ravel()
-        unit = np.broadcast_to(np.eye(3), (len(at), 3, 3))
-        G = np.concatenate([unit, -cross_matrices(at - at.mean(axis=0))], axis=2).reshape(-1, 6)
-        Q, _ = np.linalg.qr(G)
-        P = np.eye(len(rows)) - Q @ Q.T
-        sigma = np.full((len(self.estimate.map.ids), 3), np.nan)
-        left = P @ self.covariance[np.ix_(rows, rows)] @ P
-        sigma[placed] = np.sqrt(np.maximum(np.diag(left), 0.0)).reshape(-1, 3)
+        sigma = np.full((len(map_.ids), 3), np.nan)
+        sigma[placed] = relative_std(map_.position_m[placed], self.covariance[np.ix_(rows, rows)])
         return sigma
+
+
+def relative_std(places_m: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the standard deviations of positions, (m, 3), in the frame that fits all best.
+
+    They belong to the part of the covariance C that no rigid motion explains: P C P with P = 1 - G
+    (G^T G)^-1 G^T, where G are the derivatives of the positions by the six rigid motions. In the
+    frame of a single marker, the uncertain tilt of its sheet would add errors in proportion to the
+    distance.
+    """
+    unit = np.broadcast_to(np.eye(3), (len(places_m), 3, 3))
+    turns = -cross_matrices(places_m - places_m.mean(axis=0))
+    Q = orth(np.concatenate([unit, turns], axis=2).reshape(-1, 6))
+    P = np.eye(len(Q)) - Q @ Q.T
+    return np.sqrt(np.maximum(np.diag(P @ covariance @ P), 0.0)).reshape(-1, 3)
 
 
 def adjust(

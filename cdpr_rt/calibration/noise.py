@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
@@ -338,16 +339,12 @@ def _rates(seen: Observations) -> FloatArray:
 def _lengths_at(seen: Observations, offset_s: float) -> FloatArray:
     """Return lengths (N, n) that are later by an offset, extrapolated at the ends of a piece."""
     assert seen.time_s is not None
-    out, rate, piece = seen.length_m.copy(), _rates(seen), _pieces(seen.time_s)
+    out, piece = seen.length_m.copy(), _pieces(seen.time_s)
     for one in range(int(piece[-1]) + 1):
-        these = np.flatnonzero(piece == one)
-        time_s = seen.time_s[these]
-        wanted = time_s + offset_s
-        inside = np.clip(wanted, time_s[0], time_s[-1])
-        for i in range(out.shape[1]):
-            beyond = np.where(wanted > inside, rate[these[-1], i], rate[these[0], i])
-            at = np.interp(inside, time_s, seen.length_m[these, i])
-            out[these, i] = at + beyond * (wanted - inside)
+        these = piece == one
+        if these.sum() > 1:
+            lines = make_interp_spline(seen.time_s[these], seen.length_m[these], k=1)
+            out[these] = lines(seen.time_s[these] + offset_s)
     return out
 
 

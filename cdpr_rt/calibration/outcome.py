@@ -20,20 +20,18 @@ from cdpr_rt.calibration.fit import Fit
 from cdpr_rt.calibration.marker_map import Coverage, listed
 from cdpr_rt.calibration.noise import NoiseSeen
 from cdpr_rt.calibration.parameters import DRUM
-from cdpr_rt.calibration.verdict import (
-    SHARED_SCALE_STD,
-    CalibrationChange,
-    OpenDirection,
-    Predicted3Sigma,
-    camera_table,
-    parameter_table,
-)
 from cdpr_rt.calibration.verification import (
     LEAST_VERIFYING,
     MORE,
+    SHARED_SCALE_STD,
+    CalibrationChange,
     Honesty,
+    OpenDirection,
+    Predicted3Sigma,
     Unused,
     Verification,
+    camera_table,
+    parameter_table,
 )
 
 CalibrationMethod = Literal["points", "redundancy", "camera"]

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
+from cdpr_rt.calibration.camera_geometry import cross_matrices
 from cdpr_rt.calibration.fit import Fit, JUMP_STD_m, locate
 from cdpr_rt.calibration.marker_map import best_fit
 from cdpr_rt.calibration.parameters import DRUM, CableGeometry
@@ -159,20 +160,13 @@ class _Score:
 class _ByLengths:
     """Poses from lengths alone, linearised at a geometry."""
 
-    def __init__(
-        self,
-        file: CableGeometry,
-        at: CableGeometry,
-        seen: Observations,
-        jumps_m: FloatArray,
-        variance_factor: float,
-        first_m: FloatArray,
-    ) -> None:
-        """Take the file, the geometry for the linearisation, and the first pose's target (3,)."""
+    def __init__(self, file: CableGeometry, found: Fit, first_m: FloatArray) -> None:
+        """Take the file, a fit without any points, and the first pose's target (3,)."""
+        at, jumps_m, seen = found.geometry, found.jumps_m, found.seen
         blind = seen.unmeasured()
         there = locate(at, blind.without_jumps(jumps_m)).poses
         rows = linearise(at, blind, there, jumps_m)
-        noise = 1.0 / math.sqrt(max(variance_factor, 1.0))
+        noise = 1.0 / math.sqrt(max(found.variance_factor, 1.0))
         r, Jp, Jx = (part * noise for part in (rows.residual, rows.by_parameter, rows.by_pose))
         across = np.swapaxes(Jx, 1, 2)
         H = across @ Jx
@@ -185,11 +179,8 @@ class _ByLengths:
         information = np.diag(known**-2.0) + np.einsum("jrp,jrq->pq", left, left)
         gradient = np.einsum("jrp,jr->p", left, off) + values / known**2
         arm = there[:, 1:] @ seen.target_m
-        twist = np.zeros((len(there), 3, 6))
-        twist[:, :, :3] = np.eye(3)
-        twist[:, 0, 4], twist[:, 0, 5] = arm[:, 2], -arm[:, 1]
-        twist[:, 1, 3], twist[:, 1, 5] = -arm[:, 2], arm[:, 0]
-        twist[:, 2, 3], twist[:, 2, 4] = arm[:, 1], -arm[:, 0]
+        along = np.broadcast_to(np.eye(3), (len(there), 3, 3))
+        twist = np.concatenate([along, -cross_matrices(arm)], axis=2)
         k = file.coordinates
         B = twist[:, :k][:, :, list(file.free)]
         self.known, self.values = known, values
@@ -308,15 +299,14 @@ def slipped(file: CableGeometry, blind: Fit, seen: Observations) -> SlipVerdict:
     points = Points.of(seen, file.coordinates)
     if len(points.pose) < _LEAST:
         return SlipVerdict()
-    at, jumps_m = blind.geometry, blind.jumps_m
     verdict, said = SlipVerdict(), "none yet"
     for _ in range(_ROUNDS):  # each round linearises at the result of the one before
-        model = _ByLengths(file, at, blind.seen, jumps_m, blind.variance_factor, seen.start[0, 0])
-        verdict, values = _judged(file, model, points)
+        verdict, values = _judged(file, _ByLengths(file, blind, seen.start[0, 0]), points)
         if verdict.text == said:
             break
-        said = verdict.text
-        at, jumps_m = at.with_values(file.values() + values[: at.size]), values[at.size :]
+        said, size = verdict.text, file.size
+        at = blind.geometry.with_values(file.values() + values[:size])
+        blind = replace(blind, geometry=at, jumps_m=values[size:])
     return verdict
 
 
@@ -325,10 +315,7 @@ def cost_of_readings(
 ) -> SlipVerdict:
     """Return the verdict that `faults` wrong lengths, not used in `blind`, explain the points."""
     points = Points.of(seen, file.coordinates)
-    model = _ByLengths(
-        file, blind.geometry, blind.seen, blind.jumps_m, blind.variance_factor, seen.start[0, 0]
-    )
-    score = model.score(_Slip("", points, 0.0))
+    score = _ByLengths(file, blind, seen.start[0, 0]).score(_Slip("", points, 0.0))
     return SlipVerdict(explained=not score.misfit, cost=score.cost + _POINT_COST * faults)
 
 

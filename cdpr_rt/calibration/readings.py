@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,7 +19,7 @@ from cdpr_profiles.bounded_input import read_text
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError, value_text
 from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
-from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_profiles.reader import Profile, read_json_model, validated_cells
 from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.marker_map import SeenMarkers, Sighting
 from cdpr_rt.errors import InvalidRequestError
@@ -195,19 +195,9 @@ class Observations:
     def of_lengths(
         cls, length_m: FloatArray, tension_N: FloatArray, start: FloatArray
     ) -> Observations:
-        """Return observations with lengths and tensions (N, n) only; raises InvalidRequestError."""
+        """Return observations with lengths and tensions (N, n) only."""
         lengths, tensions = np.array(length_m, float), np.array(tension_N, float)
-        poses = np.array(start, float)
-        count = len(lengths)
-        if lengths.shape != tensions.shape or poses.shape != (count, 4, 3):
-            raise InvalidRequestError(
-                f"lengths {lengths.shape}, tensions {tensions.shape}, poses {poses.shape}: allowed:"
-                " (N, n), (N, n) and (N, 4, 3)"
-            )
-        for name, values in (("lengths", lengths), ("tensions", tensions), ("poses", poses)):
-            if not np.isfinite(values).all():
-                bad = int(np.argmin(np.isfinite(values).reshape(count, -1).all(axis=1)))
-                raise InvalidRequestError(f"{name} of pose {bad + 1}: allowed: finite numbers")
+        poses, count = np.array(start, float), len(lengths)
         nowhere = np.full((count, 3), np.inf)
         turn = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
         used = np.ones(lengths.shape, bool)
@@ -236,8 +226,6 @@ class Observations:
         measured = np.array(position_m, float)
         known = np.isfinite(measured)
         std = np.where(known, np.broadcast_to(std_m, measured.shape), np.inf)
-        if not (std > 0.0).all():
-            raise InvalidRequestError("standard deviation of a position: allowed: above 0")
         point = np.zeros(3) if target_m is None else np.array(target_m, float)
         return replace(
             self,
@@ -251,8 +239,6 @@ class Observations:
         measured = np.array(rotation, float)
         known = np.isfinite(measured).all(axis=(1, 2))
         std = np.where(known[:, None], np.broadcast_to(std_rad, (len(measured), 3)), np.inf)
-        if not (std > 0.0).all():
-            raise InvalidRequestError("standard deviation of a rotation: allowed: above 0")
         return replace(
             self,
             rotation=np.where(known[:, None, None], measured, np.eye(3)),
@@ -268,22 +254,13 @@ class Observations:
         """Return the chosen poses; jumps stay at the same time."""
         index = np.arange(self.poses)[chosen]
         jumps = tuple((cable, int((index < pose).sum())) for cable, pose in self.jumps)
-        return replace(
-            self,
-            length_m=self.length_m[index],
-            tension_N=self.tension_N[index],
-            start=self.start[index],
-            used=self.used[index],
-            position_m=self.position_m[index],
-            position_std_m=self.position_std_m[index],
-            rotation=self.rotation[index],
-            rotation_std_rad=self.rotation_std_rad[index],
-            target_rotation=self.target_rotation[index],
-            jumps=jumps,
-            tension_free=None if self.tension_free is None else self.tension_free[index],
-            time_s=None if self.time_s is None else self.time_s[index],
-            markers=None if self.markers is None else self.markers.of_images(index),
-        )
+        of_poses: dict[str, Any] = {
+            name: value[index]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name not in ("target_m", "reference_m")
+        }
+        markers = None if self.markers is None else self.markers.of_images(index)
+        return replace(self, **of_poses, jumps=jumps, markers=markers)
 
     def number(self, pose: int) -> int:
         """Return the number of a pose in the data, counted from 1, for an index from 0."""
@@ -298,13 +275,8 @@ class Observations:
 
 
 _MOST_BYTES, _MOST_DATA_BYTES = 4 << 20, 64 << 20
-_AXES = "xyz"
-_STD_mm = 2.0
-_STD_deg = 0.5
 _TURNS = ("rx_deg", "ry_deg", "rz_deg")
 _REQUIRED = ("pose", "x_mm", "y_mm")
-_COLUMNS = (*_REQUIRED, "z_mm", "sigma_mm", *_TURNS, "sigma_deg")
-_FURTHEST_mm = 1e6
 _ROTATION = 1e-4
 _TURNED_rad = 0.2
 
@@ -493,6 +465,24 @@ def load_data(path: Path) -> CalibrationData:
     return read_json_model(path, CalibrationData, _MOST_DATA_BYTES)
 
 
+_Cell = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Sigma = Annotated[float, Field(gt=0.0, le=1e6)]
+
+
+class _PointRow(Profile):
+    """The cells of a line of a file of measured points that are not empty."""
+
+    pose: Annotated[int, Field(ge=1)]
+    x_mm: _Cell = math.nan
+    y_mm: _Cell = math.nan
+    z_mm: _Cell = math.nan
+    sigma_mm: _Sigma = 2.0
+    rx_deg: _Cell = math.nan
+    ry_deg: _Cell = math.nan
+    rz_deg: _Cell = math.nan
+    sigma_deg: _Sigma = 0.5
+
+
 @dataclass(frozen=True)
 class MeasuredPoint:
     """Measured position of the platform's origin at a pose; nan if not measured."""
@@ -501,11 +491,11 @@ class MeasuredPoint:
     """Index of the pose, counted from 0."""
     position_m: FloatArray
     std_m: float
-    std_guessed: bool = False
+    std_guessed: bool
     """Whether the file gives no standard deviation for this position."""
-    turn_rad: FloatArray | None = None
+    turn_rad: FloatArray | None
     """Measured rotation vector of the platform (3,); nan for a coordinate without a column."""
-    turn_std_rad: float = math.radians(_STD_deg)
+    turn_std_rad: float
 
 
 def load_points(path: Path) -> list[MeasuredPoint]:
@@ -522,14 +512,16 @@ def load_points(path: Path) -> list[MeasuredPoint]:
         raise ProfileError(path, "", f"is not a CSV file: {error}") from None
     lines = [(line, row) for line, row in lines if row and not row[0].lstrip().startswith("#")]
     first, names = (lines[0][0], [name.strip() for name in lines[0][1]]) if lines else (1, [])
-    known, required = set(names) <= set(_COLUMNS), set(names) >= set(_REQUIRED)
-    if not known or not required or len(set(names)) < len(names):
-        problem = f"allowed: the columns {','.join(_COLUMNS)}; only the first three are required"
+    if not set(_REQUIRED) <= set(names) <= set(_PointRow.model_fields) or len(set(names)) < len(
+        names
+    ):
+        known = ",".join(_PointRow.model_fields)
+        problem = f"allowed: the columns {known}; only the first three are required"
         raise ProfileError(path, f"line {first}", problem)
     points: list[MeasuredPoint] = []
     line_of: dict[int, int] = {}
     for line, row in lines[1:]:
-        point = _point(path, line, _cells(path, line, names, row))
+        point = _point(path, line, names, row)
         if (other := line_of.setdefault(point.pose, line)) != line:
             problem = f"pose {point.pose + 1} is also in line {other}; keep one of the two lines"
             raise ProfileError(path, f"line {line}: pose", problem)
@@ -537,55 +529,22 @@ def load_points(path: Path) -> list[MeasuredPoint]:
     return points
 
 
-def _cells(path: Path, line: int, names: list[str], row: list[str]) -> dict[str, str]:
+def _point(path: Path, line: int, names: list[str], row: list[str]) -> MeasuredPoint:
     if len(row) > len(names):
         problem = f"{len(row)} cells; allowed: up to {len(names)}, one for each column"
         raise ProfileError(path, f"line {line}", problem)
-    return dict(zip(names, row, strict=False))  # missing cells at the end of a row count as empty
-
-
-def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:
-    def number(key: str, otherwise: float) -> float:
-        text = row.get(key, "").strip()
-        if not text:
-            return otherwise
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not abs(value) <= _FURTHEST_mm:
-            raise ProfileError(path, f"line {line}: {key}", f"value {text!r}; allowed: a number")
-        return value
-
-    pose, sigma = number("pose", math.nan), number("sigma_mm", _STD_mm)
-    if not (pose >= 1.0 and pose.is_integer()):
-        raise ProfileError(path, f"line {line}: pose", "allowed: a pose's number, from 1")
-    if not sigma > 0.0:
-        raise ProfileError(path, f"line {line}: sigma_mm", f"value {sigma:g}; allowed: above 0")
-    at = np.array([number(f"{axis}_mm", math.nan) for axis in _AXES])
-    turn_deg, sigma_deg = _turn(path, line, row, number), number("sigma_deg", _STD_deg)
-    if not sigma_deg > 0.0:
-        raise ProfileError(
-            path, f"line {line}: sigma_deg", f"value {sigma_deg:g}; allowed: above 0"
-        )
+    cells = {name: cell.strip() for name, cell in zip(names, row, strict=False) if cell.strip()}
+    one = validated_cells(path, line, cells, _PointRow)
+    turn_rad, turns = None, [name for name in _TURNS if name in names]
+    if cells.keys() & turns:
+        if empty := [name for name in turns if name not in cells]:
+            problem = "is empty; give all angles of a pose, or none"
+            raise ProfileError(path, f"line {line}: {empty[0]}", problem)
+        turn_rad = np.radians([one.rx_deg, one.ry_deg, one.rz_deg])
     return MeasuredPoint(
-        int(pose) - 1, 1e-3 * at, 1e-3 * sigma, not row.get("sigma_mm", "").strip(),
-        None if turn_deg is None else np.radians(turn_deg), math.radians(sigma_deg),
+        one.pose - 1, 1e-3 * np.array([one.x_mm, one.y_mm, one.z_mm]), 1e-3 * one.sigma_mm,
+        "sigma_mm" not in cells, turn_rad, math.radians(one.sigma_deg),
     )  # fmt: skip
-
-
-def _turn(
-    path: Path, line: int, row: dict[str, str], number: Callable[[str, float], float]
-) -> FloatArray | None:
-    """Return the rotation vector of a row, deg, (3,); None if its cells are empty."""
-    empty = [name for name in _TURNS if name in row and not row[name].strip()]
-    given = [name for name in _TURNS if name in row and name not in empty]
-    if not given:
-        return None
-    if empty:
-        problem = "is empty; give all angles of a pose, or none"
-        raise ProfileError(path, f"line {line}: {empty[0]}", problem)
-    return np.array([number(name, math.nan) for name in _TURNS])
 
 
 def with_points(

@@ -93,23 +93,39 @@ def linearise(
 
     P counts the geometry's parameters and then the jumps.
     """
-    count, n, d = seen.poses, geometry.n, len(geometry.free)
-    kernel = geometry.kernel_geometry()
-    cables = np.empty((count, KERNEL_ROWS, n))
-    run_poses(kernel, poses, cables)
-    chosen = [i for i in geometry.free if i < 6]
-    size = geometry.size + len(seen.jumps)
-    rows = n + geometry.balance_rows + 6
-    out = Linearised(
-        np.zeros((count, rows)), np.zeros((count, rows, size)), np.zeros((count, rows, d))
-    )
-    _closure(geometry, seen, poses, jumps_m, cables, kernel, chosen, out)
+    at = _At.of(geometry, seen, poses)
+    count, size = seen.poses, geometry.size + len(seen.jumps)
+    rows = geometry.n + geometry.balance_rows + 6
+    out = Linearised(*(np.zeros((count, rows, *more)) for more in ((), (size,), (len(at.free),))))
+    _closure(at, jumps_m, out)
     if geometry.turns_freely:
-        _balance(geometry, seen, poses, cables, kernel, chosen, out)
+        _balance(at, out)
     elif geometry.hangs_freely:
-        _equilibrium(geometry, seen, poses, cables, kernel, out)
-    _measured_poses(geometry, seen, poses, chosen, out)
+        _equilibrium(at, out)
+    _measured_poses(at, out)
     return out
+
+
+@dataclass(frozen=True)
+class _At:
+    """The place of a linearisation: a geometry, observations, poses, and their cables."""
+
+    geometry: CableGeometry
+    seen: Observations
+    poses: FloatArray
+    kernel: FloatArray
+    """The geometry for `cable_kernel`."""
+    cables: FloatArray
+    """Cables at the poses as by `run_poses`, (N, rows, n)."""
+    free: list[int]
+    """Components of the twist in which poses are estimated."""
+
+    @classmethod
+    def of(cls, geometry: CableGeometry, seen: Observations, poses: FloatArray) -> _At:
+        kernel = geometry.kernel_geometry()
+        cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))
+        run_poses(kernel, poses, cables)
+        return cls(geometry, seen, poses, kernel, cables, [i for i in geometry.free if i < 6])
 
 
 def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
@@ -156,17 +172,9 @@ def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray)
     return np.where(lengths > 0.0, straight / lengths, 1.0 + soft * tension_N)
 
 
-def _closure(
-    geometry: CableGeometry,
-    seen: Observations,
-    poses: FloatArray,
-    jumps_m: FloatArray,
-    cables: FloatArray,
-    kernel: FloatArray,
-    chosen: list[int],
-    out: Linearised,
-) -> None:
+def _closure(at: _At, jumps_m: FloatArray, out: Linearised) -> None:
     """Write the rows of the lengths."""
+    geometry, seen, poses, cables = at.geometry, at.seen, at.poses, at.cables
     n, rows = geometry.n, list(geometry.rows)
     extra = np.zeros_like(seen.length_m)
     for (cable, pose), jump in zip(seen.jumps, jumps_m, strict=True):
@@ -182,7 +190,7 @@ def _closure(
     each[..., OFFSET] = stretch
     each[..., DRUM] = paid_out * stretch
     each[..., ANCHORS] = -np.einsum("jka,jik->jia", poses[:, 1:], u)
-    theta = np.arccos(np.clip(np.einsum("jik,ki->ji", u, kernel[AXIS:WEIGHT]), -1.0, 1.0))
+    theta = np.arccos(np.clip(np.einsum("jik,ki->ji", u, at.kernel[AXIS:WEIGHT]), -1.0, 1.0))
     each[..., CABLE_ROWS - 1] = np.sin(theta) - theta
     each *= weight[..., None]
     q = len(rows)
@@ -193,22 +201,15 @@ def _closure(
         out.by_parameter[:, :n, geometry.size - 1] = weight * by_elongation
     for k, (cable, pose) in enumerate(seen.jumps):
         out.by_parameter[pose:, cable, geometry.size + k] = (weight * stretch)[pose:, cable]
-    out.by_pose[:, :n] = -weight[..., None] * np.swapaxes(cables[:, chosen], 1, 2)
+    out.by_pose[:, :n] = -weight[..., None] * np.swapaxes(cables[:, at.free], 1, 2)
 
 
-def _balance(
-    geometry: CableGeometry,
-    seen: Observations,
-    poses: FloatArray,
-    cables: FloatArray,
-    kernel: FloatArray,
-    chosen: list[int],
-    out: Linearised,
-) -> None:
+def _balance(at: _At, out: Linearised) -> None:
     """Write the row of the moment about z of a platform that turns freely in its plane."""
+    geometry, seen, poses, cables = at.geometry, at.seen, at.poses, at.cables
     n, q = geometry.n, len(geometry.rows)
     Q = poses[:, 1:3, :2]
-    arm = np.einsum("jab,bi->jia", Q, kernel[ANCHOR : ANCHOR + 2])
+    arm = np.einsum("jab,bi->jia", Q, at.kernel[ANCHOR : ANCHOR + 2])
     u = np.swapaxes(cables[:, :2], 1, 2)
     t, rho = seen.tension_N, cables[:, FREE]
     across = arm[..., 0] * u[..., 1] - arm[..., 1] * u[..., 0]
@@ -229,7 +230,7 @@ def _balance(
     weight = np.asarray(seen.used.all(axis=1) / held)
     out.residual[:, n] = weight * moment
     by_pose = {0: by_place[..., 0].sum(axis=1), 1: by_place[..., 1].sum(axis=1), 5: by_angle}
-    for k, direction in enumerate(chosen):
+    for k, direction in enumerate(at.free):
         out.by_pose[:, n, k] = weight * by_pose[direction]
     direct = t[..., None] * np.stack([u[..., 1], -u[..., 0]], axis=-1)
     by_anchor = np.einsum("jab,jia->jib", Q, by_place + direct)
@@ -242,15 +243,9 @@ def _balance(
             out.by_parameter[:, n, columns] = weight[:, None] * by_this
 
 
-def _equilibrium(
-    geometry: CableGeometry,
-    seen: Observations,
-    poses: FloatArray,
-    cables: FloatArray,
-    kernel: FloatArray,
-    out: Linearised,
-) -> None:
+def _equilibrium(at: _At, out: Linearised) -> None:
     """Write the rows of a platform that hangs freely: forces, moments, tensions."""
+    geometry, seen, poses, cables = at.geometry, at.seen, at.poses, at.cables
     n, q, platform = geometry.n, len(geometry.rows), geometry.model.platform
     weight_N = platform.mass_kg * G_m_s2
     known, Q = geometry.knowledge, poses[:, 1:]
@@ -262,8 +257,8 @@ def _equilibrium(
     pull, centre = np.array([0.0, 0.0, -weight_N]), Q @ in_space(platform.centre_of_mass_m)
     load[:, :3], load[:, 3:] = pull, np.cross(centre, pull)
     for j in range(len(poses)):
-        hang(kernel, poses[j], cables[j], load[j])
-        write_tension_rises(kernel, cables[j], rise[j])
+        hang(at.kernel, poses[j], cables[j], load[j])
+        write_tension_rises(at.kernel, cables[j], rise[j])
     A = np.concatenate([-cables[:, :6] / held[:, None], np.tile(np.eye(n), (len(poses), 1, 1))], 1)
     A[:, 6:] /= root * told_N
     right = np.concatenate([load / held, (rise - seen.tension_N) / (root * told_N)], axis=1)
@@ -274,7 +269,7 @@ def _equilibrium(
     weight = np.asarray(seen.used.all(axis=1), float)
     out.residual[:, rows] = weight[:, None] * (across @ right[..., None])[..., 0]
     # derivative of the wrench by the motion v of an anchor point with constant arm, (N, n, 6, 3)
-    u, arm = np.swapaxes(cables[:, :3], 1, 2), np.einsum("jab,bi->jia", Q, kernel[ANCHOR:RADIUS])
+    u, arm = np.swapaxes(cables[:, :3], 1, 2), np.einsum("jab,bi->jia", Q, at.kernel[ANCHOR:RADIUS])
     bent = (np.eye(3) - u[..., :, None] * u[..., None, :]) * (t / cables[:, FREE])[..., None, None]
     moved = -np.concatenate([bent, cross_matrices(arm) @ bent], axis=2)
     # and by the change d of the arm: -t d × u
@@ -298,14 +293,9 @@ def _equilibrium(
             out.by_parameter[:, rows, columns] = part @ np.swapaxes(own, 1, 2)
 
 
-def _measured_poses(
-    geometry: CableGeometry,
-    seen: Observations,
-    poses: FloatArray,
-    chosen: list[int],
-    out: Linearised,
-) -> None:
+def _measured_poses(at: _At, out: Linearised) -> None:
     """Write the last six rows, for externally measured positions and rotations."""
+    geometry, seen, poses = at.geometry, at.seen, at.poses
     arm = poses[:, 1:] @ seen.target_m
     first = out.points.start
     known = geometry.knowledge
@@ -326,4 +316,4 @@ def _measured_poses(
         skew = cross_matrices(phi)
         # inverse of the left Jacobian of SO(3), to second order
         by_twist[:, 3:, 3:] = weight[..., None] * (np.eye(3) - 0.5 * skew + skew @ skew / 12.0)
-    out.by_pose[:, first:] = by_twist[:, :, chosen]
+    out.by_pose[:, first:] = by_twist[:, :, at.free]

@@ -223,7 +223,7 @@ def stored_thesis(result: ThesisResult) -> StoredMethod:
     """Return the thesis' curves for storage; they apply at the encoder's angle, without
     look-ahead.
     """
-    return _stored(result.tables(TABLE_SAMPLES), result.friction, 0.0, 0.0)
+    return _stored(result, 0.0, 0.0)
 
 
 def stored_harmonic_model(result: HarmonicResult, latency_s: float | None = None) -> StoredMethod:
@@ -232,8 +232,19 @@ def stored_harmonic_model(result: HarmonicResult, latency_s: float | None = None
     `latency_s` replaces the identified latency, because that of imported recordings is not the
     drive's.
     """
-    ahead = max(0.0, result.latency_s.value if latency_s is None else latency_s)
-    return _stored(result.tables(TABLE_SAMPLES), result.friction, ahead, OBSERVER_s)
+    return _stored(result, result.latency_s.value if latency_s is None else latency_s, OBSERVER_s)
+
+
+def _stored(
+    result: ThesisResult | HarmonicResult, look_ahead_s: float, observer_s: float
+) -> StoredMethod:
+    forward, backward = np.round(result.tables(TABLE_SAMPLES), 9).tolist()
+    return StoredMethod(
+        table_Nm=(forward, backward),
+        friction=StoredFriction(**asdict(result.friction)),
+        look_ahead_s=max(0.0, look_ahead_s),
+        observer_s=observer_s,
+    )
 
 
 def stored_harmonics(result: HarmonicResult) -> list[StoredHarmonic]:
@@ -250,18 +261,3 @@ def stored_harmonics(result: HarmonicResult) -> list[StoredHarmonic]:
         )
         for h in result.harmonics
     ]
-
-
-def _stored(
-    table: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
-    friction: FrictionFeedforward,
-    look_ahead_s: float,
-    observer_s: float,
-) -> StoredMethod:
-    rounded = np.round(table, 9)
-    return StoredMethod(
-        table_Nm=(rounded[0].tolist(), rounded[1].tolist()),
-        friction=StoredFriction(**asdict(friction)),
-        look_ahead_s=look_ahead_s,
-        observer_s=observer_s,
-    )

@@ -156,16 +156,17 @@ def _figures(metrics: ValidationMetrics) -> dict[str, float]:
 # The files of a commissioning.
 
 
-@dataclass(frozen=True)
 class Paths:
-    """Files of a commissioning."""
+    """Files of a commissioning in the folder `out`."""
 
-    out: Path
-
-    @property
-    def raw_folder(self) -> Path:
-        """Return the folder of the recorded passes."""
-        return self.out / "raw"
+    def __init__(self, out: Path) -> None:
+        self.out, self.raw_folder = out, out / "raw"
+        self.profile = out / "cogging-profile.json"
+        self.run = out / "run.json"
+        """Data of the report that are not in the recordings."""
+        self.results, self.page = out / "report.json", out / "report.html"
+        self.truth = out / "simulator-truth.log"
+        """The simulator's log of the truth, which only the report reads."""
 
     def raw(self, name: str) -> Path:
         """Return the file of one recorded pass."""
@@ -175,31 +176,6 @@ class Paths:
         """Return the recorded passes whose names begin with `name`, in the order they were run."""
         found = self.raw_folder.glob(f"{name}-[0-9]*.raw")
         return sorted(found, key=lambda path: int(path.stem.rsplit("-", 1)[1]))
-
-    @property
-    def profile(self) -> Path:
-        """Return the file of the cogging profile."""
-        return self.out / "cogging-profile.json"
-
-    @property
-    def run(self) -> Path:
-        """Return the file with the data of the report that are not in the recordings."""
-        return self.out / "run.json"
-
-    @property
-    def results(self) -> Path:
-        """Return the file of the results."""
-        return self.out / "report.json"
-
-    @property
-    def page(self) -> Path:
-        """Return the report for people."""
-        return self.out / "report.html"
-
-    @property
-    def truth(self) -> Path:
-        """Return the simulator's log of the truth, which only the report reads."""
-        return self.out / "simulator-truth.log"
 
 
 # Identification of a motor from the recorded passes of a commissioning; its cogging profile.

@@ -11,13 +11,17 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.identification import windows as design
-from cdpr_rt.identification.remainder import remaining_curve
-from cdpr_rt.identification.result import ConfidenceInterval, Harmonic, HarmonicResult, likely_cause
+from cdpr_rt.identification.result import (
+    ConfidenceInterval,
+    Harmonic,
+    HarmonicResult,
+    likely_cause,
+    remaining_curve,
+)
 from cdpr_rt.identification.windows import (
     STARTS,
     TWO_PI,
     ColumnLayout,
-    Equations,
     FrictionRun,
     FrictionShape,
     IdentificationError,
@@ -299,26 +303,27 @@ def _scale(diagonal: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.where(diagonal > _EMPTY * diagonal.max(), diagonal, np.inf)))
 
 
-def choose(equations: Equations, fixed: list[int], rows: RowWeights) -> OrderSelection:
+def choose(
+    kinds: Normal, layout: ColumnLayout, fixed: list[int], rows: RowWeights
+) -> OrderSelection:
     """Choose the orders by the extended Bayesian information criterion (Chen and Chen, 2008).
 
     Orders are added one by one; each is the one that lowers the sum of squares S most. The result
     minimises N ln(S) + 2 k (ln N + ln K) for k orders of K candidates and N independent rows.
     Neighbouring rows contain the same noise, so `rows.correlation` of them count as one.
     """
-    kinds = equations.parts
     used = rows.weight > 0.0
     independent = float((kinds.rows[used] / rows.correlation[used]).sum())
     total = kinds.weighted(np.where(used, rows.weight / rows.correlation, 0.0))
-    count = len(equations.layout.orders)
+    count = len(layout.orders)
     most = min(_MOST, int(independent / _ROWS_PER_ORDER))
-    added, left = _forward(total, fixed, equations.layout, most)
+    added, left = _forward(total, fixed, layout, most)
     size = np.arange(left.size)
     criterion = independent * np.log(left) + 2.0 * size * math.log(max(independent, 2.0) * count)
     best = int(np.argmin(criterion))
     weights = float(kinds.rows @ (rows.weight / rows.correlation))
     return OrderSelection(
-        tuple(sorted(equations.layout.orders[i] for i in added[:best])),
+        tuple(sorted(layout.orders[i] for i in added[:best])),
         np.sqrt(left / max(weights, 1e-300)),
         rows.correlation,
     )
@@ -364,23 +369,26 @@ def _forward(
     return added, np.array(squares)
 
 
-def rows_counted(equations: Equations) -> RowWeights:
+def rows_counted(kinds: Normal) -> RowWeights:
     """Return equal weights for all kinds of row that are frequent enough."""
-    weight = np.where(equations.parts.rows >= _FEWEST_ROWS, 1.0, 0.0)
+    weight = np.where(kinds.rows >= _FEWEST_ROWS, 1.0, 0.0)
     return RowWeights(weight, np.full(weight.size, _OVERLAP))
 
 
 def rows_by_noise(
-    equations: Equations, windows: Sequence[Windows], columns: list[int], beta: FloatArray
+    rows: FloatArray,
+    layout: ColumnLayout,
+    windows: Sequence[Windows],
+    columns: list[int],
+    beta: FloatArray,
 ) -> RowWeights:
     """Return the weights from the residual noise of a fit, and the correlation of that noise.
 
     N neighbouring rows with correlations r1, r2, ... count as N / (1 + 2 (r1 + r2 + ...)).
     """
-    rows = equations.parts.rows
     squares, correlation = np.zeros(rows.size), np.zeros(rows.size)
     for w, kind in zip(windows, design.kinds(windows), strict=True):
-        left = _left(w, equations.layout, columns, beta)
+        left = _left(w, layout, columns, beta)
         for k in range(rows.size):
             part = np.where(kind == k, left, 0.0)
             squares[k] += float(part @ part)
@@ -585,14 +593,14 @@ def _choose(
     fixed += [design.CREEP, design.CREEP + 1]
     rows = rows_counted(equations)
     for _ in range(_CHOICE_ROUNDS):
-        choice = choose(equations, fixed, rows)
-        everything = equations.parts.weighted(rows.weight / rows.correlation)
+        choice = choose(equations, every, fixed, rows)
+        everything = equations.weighted(rows.weight / rows.correlation)
         for step in range(2):
             columns = fixed + [c for n in choice.orders for c in every.order(n - 1)]
             beta = solve(everything, columns)
             if step == 0:
                 choice = replace(choice, orders=_significant(choice.orders, beta, len(fixed)))
-        rows = rows_by_noise(equations, windows, columns, beta)
+        rows = rows_by_noise(equations.rows, every, windows, columns, beta)
     choice = replace(choice, correlation=rows.correlation)
     return choice, beta[len(fixed) :], float(beta[0])
 
@@ -603,8 +611,8 @@ def explained(windows: Sequence[Windows]) -> tuple[float, float]:
     equations = design.accumulate(windows, every)
     rows = rows_counted(equations)
     fixed = [c for c in range(design.FIXED) if c not in (design.LATENCY, design.VISCOUS)]
-    _, left = _forward(equations.parts.weighted(rows.weight), fixed, every, _LAG_MOST)
-    return float(left[-1] / left[0]), float((equations.parts.rows / rows.correlation).sum())
+    _, left = _forward(equations.weighted(rows.weight), fixed, every, _LAG_MOST)
+    return float(left[-1] / left[0]), float((equations.rows / rows.correlation).sum())
 
 
 def _significant(orders: tuple[int, ...], beta: FloatArray, first: int) -> tuple[int, ...]:

@@ -527,12 +527,6 @@ class Normal:
     yy: FloatArray
     rows: FloatArray
 
-    @classmethod
-    def empty(cls, parts: int, columns: int) -> Normal:
-        """Return sums of zero rows for this number of parts and columns."""
-        shapes = (parts, columns, columns), (parts, columns), (parts,), (parts,)
-        return cls(*(np.zeros(shape) for shape in shapes))
-
     def weighted(self, weight: FloatArray) -> Normal:
         """Return the sum over the parts along the first axis, each times its weight.
 
@@ -544,14 +538,6 @@ class Normal:
             np.asarray(weight @ self.yy),
             np.asarray((weight > 0.0) @ self.rows),
         )
-
-
-@dataclass(frozen=True)
-class Equations:
-    """Normal equations by kind of row."""
-
-    layout: ColumnLayout
-    parts: Normal
 
 
 def _harmonics(windows: Windows, orders: Sequence[int], first: int, last: int) -> FloatArray:
@@ -603,11 +589,13 @@ def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
     return numbered
 
 
-def accumulate(windows: Sequence[Windows], layout: ColumnLayout) -> Equations:
-    """Sum the normal equations of all runs, by kind, in chunks of bounded memory."""
+def accumulate(windows: Sequence[Windows], layout: ColumnLayout) -> Normal:
+    """Sum the normal equations of all runs for each kind of row, in chunks of bounded memory."""
     kind = kinds(windows)
     count = 1 + max((int(one.max(initial=-1)) for one in kind), default=-1)
-    sums = Normal.empty(count, columns=layout.columns)
+    p = layout.columns
+    shapes = (count, p, p), (count, p), (count,), (count,)
+    sums = Normal(*(np.zeros(shape) for shape in shapes))
     for w, k in zip(windows, kind, strict=True):
         for first in range(0, w.torque_Nm.size, _CHUNK):
             rows = slice(first, min(first + _CHUNK, w.torque_Nm.size))
@@ -618,4 +606,4 @@ def accumulate(windows: Sequence[Windows], layout: ColumnLayout) -> Equations:
                 sums.xy[key] += x_part.T @ y_part
                 sums.yy[key] += float(y_part @ y_part)
                 sums.rows[key] += y_part.size
-    return Equations(layout, sums)
+    return sums

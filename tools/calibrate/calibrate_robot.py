@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot as Profile
-from cdpr_profiles.errors import ProfileError
 from cdpr_rt.arrays import FloatArray, real_array
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
-from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot, number_in, path_of, texts_of
+from cdpr_rt.robot import InvalidArgument, Robot, number_in, path_of, texts_of
 from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.finish import concluded, stop_criterion
-from cdpr_tools.calibrate.measure_poses import PoseOperator
+from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses
 from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted
-from cdpr_tools.calibrate.run import DATA, POINTS, Ask, read_places, report_faults_only
-from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.calibrate.run import POINTS, Ask, read_places
+from cdpr_tools.errors import errors_for_scripts
 from cdpr_tools.output import Output
 
 Measure = Callable[[FloatArray], ArrayLike | None]
@@ -68,7 +64,7 @@ def calibrate(
     if measured is not None and not callable(measured):
         raise InvalidArgument(f"measured: {measured!r}; give a function of the position")
     out, on_status = Output(as_json=True), robot.on_status
-    with _errors_of_calibrating():
+    with errors_for_scripts({"--out": "folder", "--poses": "poses"}):
         profile = daemon_run.profile_of(robot.description)
         measured_std_m = number_in("measured_std_m", measured_std_m, *_ALLOWED_m, " m")
         known = Knowledge()
@@ -89,9 +85,9 @@ def calibrate(
                 places, most = places_of(profile, count, listed, seed), count or MOST_POSES
             with daemon_run.going_on(kept):
                 read_places(
-                    *(out, profile, operator, kept, places, most),
-                    criterion if count is None else report_faults_only(criterion),
+                    *(out, profile, operator, kept, places, most, criterion),
                     _asking(operator, measured, measured_std_m, file),
+                    may_end=count is None,
                 )
         finally:
             robot.on_status = on_status
@@ -105,7 +101,7 @@ def calibrate(
 
 def _poses_in(
     profile: Profile, robot: Robot, folder: str | Path | None, resume: bool
-) -> daemon_run.DaemonPoses:
+) -> StoredPoses:
     """Return the poses in a folder; raises InvalidArgument for earlier ones unless `resume`."""
     where = (
         Path("out") / f"calibrate-{profile.profile}"
@@ -118,7 +114,7 @@ def _poses_in(
             f"folder: {where} contains {len(data.poses)} poses; choose another one, or continue "
             "after them with resume=True"
         )
-    return daemon_run.DaemonPoses(where, data)
+    return StoredPoses(where, data)
 
 
 def _asking(operator: PoseOperator, measured: Measure | None, std_m: float, path: Path) -> Ask:
@@ -142,23 +138,3 @@ def _asking(operator: PoseOperator, measured: Measure | None, std_m: float, path
         file.add(pose, [*(1e3 * position), 1e3 * std_m])
 
     return ask
-
-
-@contextmanager
-def _errors_of_calibrating() -> Iterator[None]:
-    try:
-        yield
-    except ProfileError as error:
-        raise InvalidRobot(str(error)) from None
-    except (BadInputError, InvalidRequestError) as error:
-        raise InvalidArgument(_as_arguments(str(error))) from None
-    except (CommandError, ControlError, DriverError) as error:
-        raised = Error(_as_arguments(str(error)))
-        for note in getattr(error, "__notes__", ()):
-            raised.add_note(note)
-        raise raised from None
-
-
-def _as_arguments(text: str) -> str:
-    """Return a message with the options of the commands as arguments of `calibrate`."""
-    return text.replace("--out", "folder").replace("--poses", "poses")

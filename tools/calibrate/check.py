@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,17 +19,12 @@ from cdpr_rt.calibration.fit import Fit
 from cdpr_rt.calibration.outcome import wanted_mm
 from cdpr_rt.calibration.parameters import CableGeometry, Knowledge
 from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, HandEye, load_data
-from cdpr_rt.core.clock import Clock
-from cdpr_tools.calibrate.daemon_run import (
-    DaemonPoses,
-    image_taker,
-    robot_of,
-)
+from cdpr_tools.calibrate.daemon_run import image_taker, robot_of
 from cdpr_tools.calibrate.finish import identified, with_hand_eye
-from cdpr_tools.calibrate.measure_poses import PoseOperator, StoppedError
+from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoppedError, StoredPoses
 from cdpr_tools.calibrate.places import chosen_places
 from cdpr_tools.calibrate.rig import simulated_rig
-from cdpr_tools.calibrate.run import DATA, no_poses, read_places
+from cdpr_tools.calibrate.run import no_poses, read_places
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -37,11 +32,8 @@ from cdpr_tools.output import Output
 from cdpr_tools.robots.pose_choice import Choose
 from cdpr_tools.signals import HELD, stop_on_signals
 
-if TYPE_CHECKING:
-    from cdpr_tools.calibrate.pose_camera import PoseCamera
-
 POSES = 10
-CHECK, IMAGES = "check.json", "images"
+CHECK = "check.json"
 _LEAST = 5
 _SAME_mm = 0.01
 """Exit points of a repeated fit that differ by no more than this count as unchanged."""
@@ -111,15 +103,6 @@ def checked(
     places = chosen_places(robot, POSES, seed, Choose.SPREAD)
     out.note(f"{robot.profile}: starting the simulated robot ...")
 
-    def camera(url: str, clock: Clock) -> PoseCamera:
-        from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
-            PoseCamera,
-        )
-
-        assert known is not None  # only used if `known` is set
-        setup, images = known.setup, folder / IMAGES
-        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
-
     kept = _nothing_read(folder, robot, known, simulated=True)
     with (
         stop_on_signals("the robot is brought to rest and switched off") as stop,
@@ -128,7 +111,7 @@ def checked(
             str(robot.path),
             plant=plant,
             scanner=scanner,
-            camera=None if known is None else camera,
+            camera=None if known is None else partial(kept.camera, out),
             stop=stop,
             as_calibrated=True,
         ) as operator,
@@ -163,7 +146,7 @@ def checked_running(
     places = chosen_places(robot, POSES, seed, Choose.SPREAD)
     with (
         stop_on_signals(HELD) as stop,
-        image_taker(camera, None, None, kept, out.note) as image,
+        image_taker(camera, None, None, kept, out) as image,
         _stopped(),
         commanded(daemon, in_control=True) as running,
     ):
@@ -172,11 +155,11 @@ def checked_running(
     return _judged(robot, known, kept.data)
 
 
-def _nothing_read(folder: Path, robot: Robot, known: Before | None, simulated: bool) -> DaemonPoses:
+def _nothing_read(folder: Path, robot: Robot, known: Before | None, simulated: bool) -> StoredPoses:
     """Return the empty data of a new check, in its folder."""
     camera = None if known is None else known.setup
     data = no_poses(robot, simulated, camera)
-    return DaemonPoses(folder, data, CHECK)
+    return StoredPoses(folder, data, CHECK)
 
 
 @contextmanager

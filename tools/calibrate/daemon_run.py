@@ -12,41 +12,33 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import override
 
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration_in_force import calibrated
 from cdpr_profiles.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.geometry_calibration import geometry_sha256, write_text
+from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_profiles.platform import NO_PLATFORM
-from cdpr_profiles.reader import Profile, read_json_model
+from cdpr_profiles.reader import Profile
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, PoseReading, load_points
+from cdpr_rt.calibration.readings import CalibrationData, CameraSetup, load_points
 from cdpr_rt.core.clock import PacedClock
 from cdpr_tools.calibrate import run
 from cdpr_tools.calibrate.measure_poses import (
+    COUNTED,
+    DATA,
     PoseOperator,
     PoseRefusedError,
+    StoredPoses,
     TakeImage,
     read_pose,
 )
-from cdpr_tools.calibrate.run import COUNTED, DATA, IMAGES
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.streams import discard_typed_ahead
 
 # Read the pose at which a daemon's robot stands into the data of a calibration.
-
-_COUNTS_ANEW_m = 1e-5
-
-
-class CountedFrom(Profile):
-    """Cable lengths at which the motor angles are zero; they change when counting restarts."""
-
-    length_m: tuple[float, ...] = Field(max_length=64)
 
 
 def robot_of(daemon: Daemon, as_calibrated: bool = False) -> tuple[Robot, dict[str, Any]]:
@@ -78,29 +70,7 @@ def profile_of(description: Mapping[str, Any], as_calibrated: bool = False) -> R
     return robot
 
 
-class DaemonPoses(run.StoredPoses[PoseOperator]):
-    """Poses of a robot that a daemon runs."""
-
-    @override
-    def add(self, reading: PoseReading, operator: PoseOperator) -> None:
-        poses, restarts = self.data.poses, self.data.restarts
-        counted_m = operator.counted_m
-        if poses:
-            before = read_json_model(self.folder / COUNTED, CountedFrom).length_m
-            if np.abs(np.array(before) - counted_m).max() > _COUNTS_ANEW_m:
-                restarts += (len(poses),)
-        update = {"poses": (*poses, reading), "restarts": restarts}
-        self.data = self.data.model_copy(update=update)
-        counted = CountedFrom(length_m=tuple(counted_m.tolist())).model_dump_json() + "\n"
-        if not poses:
-            write_text(self.folder / COUNTED, counted)
-        self.save()
-        # written last: if this process is killed before, the older lengths still show the next
-        # reading that counting has restarted
-        write_text(self.folder / COUNTED, counted)
-
-
-def read_into(reader: PoseOperator, robot: Robot, kept: DaemonPoses) -> None:
+def read_into(reader: PoseOperator, robot: Robot, kept: StoredPoses) -> None:
     """Read the pose at which the robot stands, and keep it.
 
     Raises ProfileError, BadInputError, WorkFailedError.
@@ -141,8 +111,8 @@ def image_taker(
     camera: str | None,
     intrinsics: Path | None,
     markers: Path | None,
-    kept: DaemonPoses,
-    note: Callable[[str], None],
+    kept: StoredPoses,
+    out: Output,
 ) -> Iterator[TakeImage]:
     """Yield a function that takes an image of the next pose with the camera of a URL, if given.
 
@@ -152,15 +122,8 @@ def image_taker(
     if camera is None:
         yield lambda _wait: None
         return
-    from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
-        PoseCamera,
-    )
-
-    setup = _camera_setup(kept.data, intrinsics, markers)
-    kept.data = kept.data.model_copy(update={"camera": setup})
-    images = kept.folder / IMAGES
-    opened = PoseCamera(camera, PacedClock(), setup.intrinsics, setup.sheets, images, note)
-    with closing(opened):
+    kept.change(camera=_camera_setup(kept.data, intrinsics, markers))
+    with closing(kept.camera(out, camera, PacedClock())) as opened:
         yield lambda wait: opened.see(len(kept.data.poses) + 1, wait)
 
 
@@ -212,7 +175,7 @@ def lines(robot: Robot, data: CalibrationData) -> list[str]:
     return said
 
 
-def going_on(kept: DaemonPoses) -> AbstractContextManager[None]:
+def going_on(kept: StoredPoses) -> AbstractContextManager[None]:
     """Add to any error of the block how to continue; see `saying_how_to_continue`."""
     return run.saying_how_to_continue(kept, "the same command continues after these poses")
 

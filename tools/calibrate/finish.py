@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
@@ -30,21 +30,17 @@ from cdpr_rt.model.calibration_state import (
     mark_not_calibrated,
     not_calibrated_reason,
 )
-from cdpr_tools.calibrate.run import COUNTED, points_of
+from cdpr_tools.calibrate.measure_poses import COUNTED
+from cdpr_tools.calibrate.run import compared_with_truth, points_of
+from cdpr_tools.calibrate.truth_comparison import TruthComparison
 from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.saving import require_own
-
-if TYPE_CHECKING:
-    from cdpr_tools.calibrate.truth_comparison import TruthComparison
 
 _PICTURE, _REPORT, _IMAGES = "calibration.png", "calibration.html", "images"
 _LEAST_JUDGED = 20
 _LITTLE = 0.1
 """Smallest relative gain for which ten more poses are worth the time."""
-
-CompareWithTruth = Callable[[Outcome], "TruthComparison"]
-"""Compares an outcome with the truth that a simulator knows."""
 
 
 def identified(
@@ -138,7 +134,6 @@ def concluded(
     folder: Path,
     dry_run: bool,
     adopt: bool,
-    compare: CompareWithTruth | None = None,
     hand_eye: Path | None = None,
     wanted_mm: float | None = None,
 ) -> dict[str, Any]:
@@ -154,7 +149,7 @@ def concluded(
         outcome = replace(
             identified(robot, data, points, geometry), adopt=adopt, wanted_mm=wanted_mm
         )
-        known = None if compare is None else compare(outcome)
+        known = compared_with_truth(outcome, source.parent)
     result: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))
     if known is not None:

@@ -6,23 +6,32 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from pydantic import Field
 
 from cdpr_profiles import Robot as Profile
+from cdpr_profiles.geometry_calibration import write_text
+from cdpr_profiles.reader import Profile as CheckedFile
+from cdpr_profiles.reader import read_json_model
 from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.marker_map import Sighting
-from cdpr_rt.calibration.readings import ImageReading, PoseReading
+from cdpr_rt.calibration.readings import CalibrationData, ImageReading, PoseReading
 from cdpr_rt.core.states import EMERGENCY_STOP
 from cdpr_rt.errors import TripError
 from cdpr_rt.robot import Error, Faulted, MotionEnded, Refused, Robot, end_text
 from cdpr_tools.client.client import ServiceRefusalError
 from cdpr_tools.client.daemon_robot import command_error
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.trials.directions import Directions, platform_of
+
+if TYPE_CHECKING:
+    from cdpr_rt.core.clock import Clock
+    from cdpr_tools.calibrate.pose_camera import PoseCamera
 
 READING_S, SETTLE_S = 0.5, 1.0
 """Averaging time of a reading, and settling time before it."""
@@ -30,6 +39,16 @@ _STILL_m = 1.5e-4
 """Change of a length within a reading beyond which the platform does not stand still."""
 _MOST_READINGS = 10
 _MOST_FAILURES = 5
+DATA, IMAGES = "data.json", "images"
+COUNTED = "counted.json"
+"""Written for poses of a daemon's robot; it marks their folder."""
+_COUNTS_ANEW_m = 1e-5
+
+
+class CountedFrom(CheckedFile):
+    """Cable lengths at which the motor angles are zero; they change when counting restarts."""
+
+    length_m: tuple[float, ...] = Field(max_length=64)
 
 
 class PoseRefusedError(Exception):
@@ -58,11 +77,8 @@ class Readings:
     length_m: FloatArray
     """(cycles, n)"""
     tension_N: FloatArray
-    position_m: FloatArray | None = None
-    """Externally measured position, (3,)."""
-    position_std_m: float | None = None
-    rotation: FloatArray | None = None
-    rotation_std_rad: float | None = None
+    measured: Mapping[str, Any] = field(default_factory=dict)
+    """The externally measured pose, as the fields of a `PoseReading`."""
 
 
 TakeImage = Callable[[Callable[[float], None]], Sighting | None]
@@ -295,48 +311,106 @@ def read_pose(operator: PoseOperator, target: FloatArray) -> PoseReading:
             readings.length_m[:half].mean(axis=0) - readings.length_m[half:].mean(axis=0)
         ).max()
         if moved < _STILL_m:
-            return _reading(readings, target, operator.image())
+            seen = operator.image()
+            return PoseReading(
+                target=tuple(np.asarray(target).tolist()),
+                length_m=tuple(readings.length_m.mean(axis=0).tolist()),
+                tension_N=tuple(readings.tension_N.mean(axis=0).tolist()),
+                image=None if seen is None else ImageReading.of(seen),
+                **readings.measured,
+            )
     raise PoseRefusedError(
         f"the platform did not come to rest: a cable still moves by {1e3 * moved:.2f} mm"
     )
 
 
 @dataclass
-class Measured:
-    """Readings of a procedure so far; `keep` is called after each addition."""
+class StoredPoses:
+    """Readings of a calibration in the files of its folder; they are complete after each pose."""
 
-    keep: Callable[[], None]
-    readings: list[PoseReading] = field(default_factory=list)
-    refused: list[str] = field(default_factory=list)
-    """Positions that were not read, with the reasons."""
-    tried: list[tuple[float, ...]] = field(default_factory=list)
-    """Positions (d,) that were not read or not reached, and are not tried again."""
+    folder: Path
+    data: CalibrationData
+    name: str = DATA
+    """Name of the file of the data."""
+    added: Callable[[int], None] = lambda _count: None
+    """Called after each reading with the number of readings."""
     failures: int = 0
     """Number of successive positions that were not reached, or at which the platform did not come
     to rest."""
 
-    def add(self, reading: PoseReading) -> None:
-        """Add a reading."""
-        self.readings.append(reading)
-        self.keep()
+    def add(self, reading: PoseReading, operator: PoseOperator) -> None:
+        """Append a reading of this operator and store it; raises ProfileError."""
+        counted = self.folder / COUNTED
+        now = CountedFrom(length_m=tuple(operator.counted_m.tolist())).model_dump_json() + "\n"
+        restarted = False
+        if self.data.poses:
+            before = read_json_model(counted, CountedFrom).length_m
+            restarted = bool(np.abs(np.array(before) - operator.counted_m).max() > _COUNTS_ANEW_m)
+        else:
+            write_text(counted, now)
+        self.append(reading, restarted)
+        # written last: if this process is killed before, the older lengths still show the next
+        # reading that counting has restarted
+        write_text(counted, now)
+        self.added(len(self.data.poses))
 
-    def leave_out(self, place: FloatArray, why: str) -> None:
-        """Leave out a position (d,) that cannot be read."""
-        self.refused.append(f"{_listed(place)}: {why}")
-        self.tried.append(tuple(place.tolist()))
+    def append(self, reading: PoseReading, restarted: bool) -> None:
+        """Store a reading; `restarted`: lengths count from another zero than before."""
+        poses, restarts = self.data.poses, self.data.restarts
+        self.change(poses=(*poses, reading), restarts=(*restarts, *[len(poses)] * restarted))
+        self.save()
+
+    def change(self, **update: object) -> None:
+        """Replace values of the data."""
+        self.data = self.data.model_copy(update=update)
+
+    def camera(self, out: Output, url: str, clock: Clock) -> PoseCamera:
+        """Open the camera of a URL for the images of further poses; raises CameraError."""
+        from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
+            PoseCamera,
+        )
+
+        setup, images = self.data.camera, self.folder / IMAGES
+        assert setup is not None  # only used if there is a camera
+        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
+
+    def save(self) -> None:
+        """Write the data; raises ProfileError."""
+        self.data.save(self.folder / self.name)
+
+    def done(self) -> set[tuple[float, ...]]:
+        """Return the targets (d,) that were read, or tried without success."""
+        return {reading.target for reading in self.data.poses} | set(self.data.tried)
+
+    def try_no_more(self, place: FloatArray, why: str = "") -> None:
+        """Do not go to a position (d,) again; `why` it was not read, if it was not."""
+        self.change(tried=(*self.data.tried, tuple(place.tolist())))
+        if why:
+            self.change(left_out=(*self.data.left_out, f"{_listed(place)}: {why}"))
 
     def interrupted(self, place: FloatArray, error: TripError) -> None:
         """Leave out a position (d,) at which the motion ended, if the position may be the cause."""
         if not isinstance(error, NotThePoseError):
             # the same may happen there again
-            self.leave_out(place, str(error))
+            self.try_no_more(place, str(error))
+
+    def require_home(self, robot: Profile, place: FloatArray) -> None:
+        """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
+        platform = platform_of(robot)
+        k = len(platform.home_m)
+        off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
+        if not self.data.poses and off_m > platform.home_tolerance_m:
+            raise BadInputError(
+                f"the platform is {1e3 * off_m:.0f} mm from home, where the first pose must be; "
+                "run `cdpr lower` and `cdpr tighten`"
+            )
 
 
 def measure_poses(
     operator: PoseOperator,
     places: Iterable[FloatArray],
     between: FloatArray,
-    measured: Measured,
+    kept: StoredPoses,
     out: Output,
 ) -> None:
     """Move to positions (d,) and read each; go through `between` if the straight way is rejected.
@@ -346,24 +420,22 @@ def measure_poses(
     five successive positions or does not come to rest there.
     """
     for place in places:
-        what = f"pose {len(measured.readings) + 1}, at {_listed(place)}"
+        what = f"pose {len(kept.data.poses) + 1}, at {_listed(place)}"
         try:
             held = _go(operator, place, between)
         except PoseRefusedError as error:
-            measured.leave_out(place, str(error))
+            kept.try_no_more(place, str(error))
             out.note(f"{what}, is left out: {error}")
             continue
         except TripError as error:
-            measured.interrupted(place, error)
+            kept.interrupted(place, error)
             raise
-        failure = _read(operator, place, held, measured)
-        measured.failures = measured.failures + 1 if failure else 0
+        failure = _read(operator, place, held, kept)
+        kept.failures = kept.failures + 1 if failure else 0
         if failure:
             out.note(f"{what}, {failure}")
-        if measured.failures >= _MOST_FAILURES:
-            raise TripError(
-                f"{measured.failures} poses in a row failed, the last {what}, {failure}"
-            )
+        if kept.failures >= _MOST_FAILURES:
+            raise TripError(f"{kept.failures} poses in a row failed, the last {what}, {failure}")
 
 
 def _go(operator: PoseOperator, place: FloatArray, between: FloatArray) -> TargetNotReached | None:
@@ -377,38 +449,22 @@ def _go(operator: PoseOperator, place: FloatArray, between: FloatArray) -> Targe
 
 
 def _read(
-    operator: PoseOperator, place: FloatArray, held: TargetNotReached | None, measured: Measured
+    operator: PoseOperator, place: FloatArray, held: TargetNotReached | None, kept: StoredPoses
 ) -> str:
     """Read the pose at which the platform stands; return the problem, or ""."""
     try:
         reading = read_pose(operator, place if held is None else held.place)
     except PoseRefusedError as error:
         why = str(error) if held is None else f"{held.why}; {error}"
-        measured.leave_out(place, why)
+        kept.try_no_more(place, why)
         return f"is left out: {why}"
     except TripError as error:
-        measured.interrupted(place, error)
+        kept.interrupted(place, error)
         raise
     if held is not None:
-        measured.tried.append(tuple(place.tolist()))
-    measured.add(reading)
+        kept.try_no_more(place)
+    kept.add(reading, operator)
     return "" if held is None else f"is read where the platform stands: {held.why}"
-
-
-def _reading(readings: Readings, target: FloatArray, seen: Sighting | None) -> PoseReading:
-    rotation = None
-    if readings.rotation is not None:
-        rotation = tuple(tuple(row) for row in readings.rotation.tolist())
-    return PoseReading(
-        target=tuple(np.asarray(target).tolist()),
-        length_m=tuple(readings.length_m.mean(axis=0).tolist()),
-        tension_N=tuple(readings.tension_N.mean(axis=0).tolist()),
-        position_m=None if readings.position_m is None else tuple(readings.position_m.tolist()),
-        position_std_m=readings.position_std_m,
-        rotation=rotation,
-        rotation_std_rad=readings.rotation_std_rad,
-        image=None if seen is None else ImageReading.of(seen),
-    )
 
 
 def _listed(place: FloatArray) -> str:

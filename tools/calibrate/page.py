@@ -16,10 +16,11 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.camera_model import SIZE, CameraModel
 from cdpr_rt.calibration.fit import Fit
+from cdpr_rt.calibration.marker_bundle import relative_std
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings import CalibrationData
 from cdpr_rt.calibration.residuals import length_std_m
-from cdpr_rt.calibration.verdict import parameter_table, predicted_std
+from cdpr_rt.calibration.verification import parameter_table, predicted_std
 from cdpr_tools import style
 from cdpr_tools.calibrate.truth_comparison import PoseErrors, TruthComparison
 from cdpr_tools.rendering import rendered
@@ -175,22 +176,13 @@ def markers_figure(found: Fit) -> Figure:
 
 
 def _known_to(found: Fit, camera: CameraModel) -> tuple[IntArray, FloatArray]:
-    """Return the markers with a known position, and their relative standard deviations in m.
-
-    These come from the covariance without the common motion of all markers.
-    """
+    """Return the markers with a known position, and their relative standard deviations in m."""
     first = found.geometry.size + found.jumps_m.size + camera.first_marker
     columns = first + 6 * np.arange(len(camera.ids))[:, None] + np.arange(3)
     placed = np.flatnonzero(np.sqrt(np.diag(found.uncertainty)[columns].max(axis=1)) < _PLACED_m)
-    at, index = camera.marker_position_m[placed], columns[placed].ravel()
-    motions = np.zeros((len(placed), 3, 6))
-    motions[:, :, :3] = np.eye(3)
-    for axis in range(3):
-        motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], at - at.mean(axis=0))
-    R = motions.reshape(-1, 6)
-    free = np.eye(len(R)) - R @ np.linalg.pinv(R)
-    variance = np.diag(free @ found.uncertainty[np.ix_(index, index)] @ free).reshape(-1, 3)
-    return placed, np.sqrt(np.maximum(variance, 0.0)).max(axis=1)
+    index = columns[placed].ravel()
+    std_m = relative_std(camera.marker_position_m[placed], found.uncertainty[np.ix_(index, index)])
+    return placed, std_m.max(axis=1)
 
 
 _IMAGE_WIDTH_px = 900

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field
@@ -113,35 +114,31 @@ class RigOperator(PoseOperator):
     @override
     def read(self, seconds: float) -> Readings:
         readings = super().read(seconds)
-        seen = self._scanned() if self._given else None
-        return readings if seen is None else Readings(readings.length_m, readings.tension_N, *seen)
+        return replace(readings, measured=self._scanned()) if self._given else readings
 
-    def _scanned(self) -> tuple[FloatArray, float, FloatArray, float] | None:
+    def _scanned(self) -> dict[str, Any]:
         """Return the scanner's mean pose since the platform stopped, with standard deviations."""
         rows, header = self._scanner.read(self._standing or 0), self._scanner.header
         if not len(rows):
-            return None
+            return {}
         better = math.sqrt(len(rows))
-        return (
-            rows["position_m"].mean(axis=0),
-            header["position_sigma_m"] / better,
-            Rotation.from_matrix(rows["rotation"]).mean().as_matrix(),
-            header["rotation_sigma_rad"] / better,
-        )
+        return {
+            "position_m": _tuple(rows["position_m"].mean(axis=0)),
+            "position_std_m": header["position_sigma_m"] / better,
+            "rotation": _tuples(Rotation.from_matrix(rows["rotation"]).mean().as_matrix()),
+            "rotation_std_rad": header["rotation_sigma_rad"] / better,
+        }
 
     def outside(self) -> OutsidePose:
         """Return the true pose and the scanner's, which the calibration does not use.
 
         The scanner's pose is the mean of its readings since the platform came to rest.
         """
-        truth, seen = self.rig.truth(), self._scanned()
+        truth = self.rig.truth()
         return OutsidePose(
             true_position_m=_tuple(truth["position_m"]),
             true_rotation=_tuples(truth["rotation"]),
-            position_m=None if seen is None else _tuple(seen[0]),
-            position_std_m=None if seen is None else seen[1],
-            rotation=None if seen is None else _tuples(seen[2]),
-            rotation_std_rad=None if seen is None else seen[3],
+            **self._scanned(),
         )
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -32,13 +32,15 @@ from cdpr_rt.calibration.readings import (
     load_points,
 )
 from cdpr_rt.calibration.verification import every_fifth
-from cdpr_rt.core.clock import Clock
 from cdpr_rt.errors import ControlError
 from cdpr_tools.calibrate.measure_poses import (
-    Measured,
+    COUNTED,
+    DATA,
+    IMAGES,
     PoseOperator,
     PoseRefusedError,
     StoppedError,
+    StoredPoses,
     measure_poses,
     read_pose,
 )
@@ -55,15 +57,9 @@ from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 
-if TYPE_CHECKING:
-    from cdpr_tools.calibrate.pose_camera import PoseCamera
-
-
-DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
+SETTINGS, OUTSIDE = "run.json", "outside.json"
 POINTS = "points.csv"
 """Positions measured at the poses of `cdpr calibrate measure --ask`, or by hand."""
-COUNTED = "counted.json"
-"""Written by `cdpr calibrate read`; it marks the folder of poses that this command has read."""
 _FIRST_S, _HELD_OUT_S = 8.0, 3.0
 
 PoseSource = Literal["camera", "scanner", "redundancy", "points"]
@@ -135,45 +131,8 @@ def no_poses(robot: Robot, simulated: bool, camera: CameraSetup | None = None) -
     )
 
 
-_Operator = TypeVar("_Operator", bound=PoseOperator)
-
-
 @dataclass
-class StoredPoses(ABC, Generic[_Operator]):
-    """Readings of a calibration in the files of its folder; they are complete after each pose."""
-
-    folder: Path
-    data: CalibrationData
-    name: str = DATA
-    """Name of the file of the data."""
-
-    @abstractmethod
-    def add(self, reading: PoseReading, operator: _Operator) -> None:
-        """Append a reading of this operator and store it; raises ProfileError."""
-
-    def save(self) -> None:
-        """Write the data; raises ProfileError."""
-        self.data.save(self.folder / self.name)
-
-    def done(self) -> set[tuple[float, ...]]:
-        """Return the targets (d,) that were read, or tried without success."""
-        return {reading.target for reading in self.data.poses} | set(self.data.tried)
-
-    def require_home(self, robot: Robot, place: FloatArray) -> None:
-        """Raise BadInputError if the first pose, (d,), is not home, where lengths are measured."""
-        platform = robot.platform
-        assert platform is not None  # callers have checked it
-        k = len(platform.home_m)
-        off_m = float(np.abs(place[:k] - np.array(platform.home_m)).max())
-        if not self.data.poses and off_m > platform.home_tolerance_m:
-            raise BadInputError(
-                f"the platform is {1e3 * off_m:.0f} mm from home, where the first pose must be; "
-                "run `cdpr lower` and `cdpr tighten`"
-            )
-
-
-@dataclass
-class StoredRun(StoredPoses[RigOperator]):
+class StoredRun(StoredPoses):
     """Readings of a run on a simulated robot, with its true and scanned poses."""
 
     outside: list[OutsidePose] = field(default_factory=list)
@@ -228,23 +187,20 @@ class StoredRun(StoredPoses[RigOperator]):
         return None if places is None else tuple(one for one in places if one not in self.done())
 
     @override
-    def add(self, reading: PoseReading, operator: RigOperator) -> None:
-        poses, restarts = self.data.poses, self.data.restarts
+    def add(self, reading: PoseReading, operator: PoseOperator) -> None:
+        assert isinstance(operator, RigOperator)
         outside = operator.outside()
         try:
-            if longer_s := _scanned_s(len(poses)):
+            if longer_s := _scanned_s(len(self.data.poses)):
                 operator.wait(longer_s)
                 # a cable may slip or creep meanwhile: use the truth from when lengths were read
                 outside = operator.outside().with_truth_of(outside)
         finally:  # the pose has been read, even if the wait fails
             self.outside.append(outside)
             OutsidePoses(poses=tuple(self.outside)).save(self.folder / OUTSIDE)
-            if self.restarted:
-                restarts += (len(poses),)
-                self.restarted = False
-            update = {"poses": (*poses, reading), "restarts": restarts}
-            self.data = self.data.model_copy(update=update)
-            self.save()
+            self.append(reading, self.restarted)
+            self.restarted = False
+        self.added(len(self.data.poses))
 
 
 def measure(
@@ -271,16 +227,6 @@ def measure(
             places = places_of(robot, settings.poses, None, settings.seed)
     plant = None if settings.plant is None else Path(settings.plant)
 
-    def camera(url: str, clock: Clock) -> PoseCamera:
-        from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
-            PoseCamera,
-        )
-
-        setup = kept.data.camera
-        assert setup is not None  # only used in a run with a camera
-        images = kept.folder / IMAGES
-        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
-
     how = f"continue with: cdpr calibrate run {robot.reference} --resume --out {kept.folder}"
     with (
         saying_how_to_continue(kept, how),
@@ -293,7 +239,7 @@ def measure(
                     str(robot.path),
                     plant=plant,
                     scanner=settings.source == "scanner",
-                    camera=camera if settings.source == "camera" else None,
+                    camera=partial(kept.camera, out) if settings.source == "camera" else None,
                     stop=stop,
                 )
             )
@@ -303,9 +249,9 @@ def measure(
             out.note(f"continuing after {count} poses; reading home again first")
         operator.number = count + 1
         read_places(
-            *(out, robot, operator, kept, places, most),
-            criterion if settings.poses is None else report_faults_only(criterion),
+            *(out, robot, operator, kept, places, most, criterion),
             home=home,
+            may_end=settings.poses is None,
         )
     return kept.data
 
@@ -332,42 +278,17 @@ def refuse_foreign(folder: Path) -> CalibrationData | None:
     raise BadInputError(f"{folder / names[0]}: {why}; choose another --out, or move the file away")
 
 
-def report_faults_only(criterion: StopCriterion) -> StopCriterion:
-    """Return a criterion that reports faults but never ends the run.
-
-    The user has given the number of poses.
-    """
-
-    def asked(data: CalibrationData) -> str | None:
-        criterion(data)
-        return None
-
-    return asked
-
-
-def truth_comparison_of(
-    robot: Robot, settings: CalibrationRunSettings, folder: Path
-) -> Callable[[Outcome], TruthComparison]:
-    """Return a function that compares the outcome of a run with the truth of its simulator."""
-
-    def compare(outcome: Outcome) -> TruthComparison:
-        plant = None if settings.plant is None else Path(settings.plant)
-        return compare_with_truth(robot, plant, outcome, OutsidePoses.load_file(folder / OUTSIDE))
-
-    return compare
-
-
-def truth_comparison_of_folder(
-    robot: Robot, folder: Path
-) -> Callable[[Outcome], TruthComparison] | None:
-    """Return such a function for the run in a folder; None if the folder has only readings."""
+def compared_with_truth(outcome: Outcome, folder: Path) -> TruthComparison | None:
+    """Return the comparison of a run's outcome with its simulator; None without such a run."""
     if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
         return None
-    return truth_comparison_of(robot, CalibrationRunSettings.load(folder), folder)
+    plant = CalibrationRunSettings.load(folder).plant
+    outside = OutsidePoses.load_file(folder / OUTSIDE)
+    return compare_with_truth(outcome.robot, plant and Path(plant), outcome, outside)
 
 
 @contextmanager
-def saying_how_to_continue(kept: StoredPoses[Any], how: str) -> Iterator[None]:
+def saying_how_to_continue(kept: StoredPoses, how: str) -> Iterator[None]:
     """Add to any error of the block what is saved, and `how` to continue.
 
     StoppedError becomes WorkFailedError.
@@ -395,15 +316,20 @@ Ask = Callable[[int], None]
 def read_places(
     out: Output,
     robot: Robot,
-    operator: _Operator,
-    kept: StoredPoses[_Operator],
+    operator: PoseOperator,
+    kept: StoredPoses,
     places: Places,
     most: int,
     criterion: StopCriterion = lambda _data: None,
     ask: Ask = lambda _pose: None,
     home: FloatArray | None = None,
+    *,
+    may_end: bool = True,
 ) -> None:
     """Read home, then batches of places until there are `most` poses, or `criterion` is met.
+
+    If `may_end` is false, the criterion only reports faults, because the user has given the number
+    of poses.
 
     Home is read if there are no poses yet, or if it is given: the place (d,) where the platform
     stands after a restart. All readings are kept, even after an error. Raises CommandError,
@@ -411,43 +337,34 @@ def read_places(
     """
     with out.progress(f"reading up to {most} poses", float(most)) as advance:
 
-        def note_tried() -> None:
-            update = {"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
-            kept.data = kept.data.model_copy(update=update)
+        def added(count: int) -> None:
+            advance(float(count))
+            ask(count)
 
-        def keep() -> None:
-            note_tried()
-            kept.add(measured.readings[-1], operator)
-            advance(float(len(kept.data.poses)))
-            ask(len(kept.data.poses))
-
-        before, done = kept.data, kept.done()
-        measured = Measured(keep, list(before.poses), list(before.left_out), list(before.tried))
+        kept.added, done = added, kept.done()
         try:
-            if home is not None or not before.poses:
-                _read_home(out, robot, operator, kept, measured, home)
+            if home is not None or not kept.data.poses:
+                _read_home(out, robot, operator, kept, home)
             for batch in places.batches():
                 left = np.array([place for place in batch if tuple(place.tolist()) not in done])
-                left = left[: most - len(measured.readings)]
-                measure_poses(operator, left, places.middle, measured, out)
-                if len(measured.readings) >= most:
+                left = left[: most - len(kept.data.poses)]
+                measure_poses(operator, left, places.middle, kept, out)
+                if len(kept.data.poses) >= most:
                     return
-                if len(left) and (why := criterion(kept.data)) is not None:
+                if len(left) and (why := criterion(kept.data)) is not None and may_end:
                     out.note(why)
                     return
-            out.note(f"only {len(measured.readings)} poses: the robot refused all others")
+            out.note(f"only {len(kept.data.poses)} poses: the robot refused all others")
         finally:
             if kept.data.poses:
-                note_tried()
                 kept.save()
 
 
 def _read_home(
     out: Output,
     robot: Robot,
-    operator: _Operator,
-    kept: StoredPoses[_Operator],
-    measured: Measured,
+    operator: PoseOperator,
+    kept: StoredPoses,
     home: FloatArray | None,
 ) -> None:
     """Read home; report camera problems before the robot moves far. Raises WorkFailedError."""
@@ -455,7 +372,7 @@ def _read_home(
         home = operator.place()
         kept.require_home(robot, home)
     try:
-        measured.add(read_pose(operator, home))
+        kept.add(read_pose(operator, home), operator)
     except PoseRefusedError as error:
         raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
     seen, setup = kept.data.poses[-1].image, kept.data.camera

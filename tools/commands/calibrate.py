@@ -179,9 +179,9 @@ def measure(
         from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
         from cdpr_tools.calibrate.daemon_run import AskedPoints, require_points_of  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import concluded, finish, stop_criterion, with_hand_eye  # noqa: PLC0415
-        from cdpr_tools.calibrate.measure_poses import PoseOperator  # noqa: PLC0415
+        from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses  # noqa: PLC0415
         from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted  # noqa: PLC0415
-        from cdpr_tools.calibrate.run import DATA, POINTS, read_places, report_faults_only  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.run import POINTS, read_places  # noqa: PLC0415  # slow to load
         from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
         from cdpr_tools.trials.directions import platform_of  # noqa: PLC0415  # slow to load
 
@@ -189,9 +189,7 @@ def measure(
         geometry, known = geometry_of(robot, identify, known_mm), hand_eye_of(hand_eye)
         count, listed = poses_wanted(robot, poses)
         folder = out_dir or Path("out") / f"calibrate-{robot.profile}"
-        kept = daemon_run.DaemonPoses(
-            folder, daemon_run.data_of(folder, robot, description["simulated"])
-        )
+        kept = StoredPoses(folder, daemon_run.data_of(folder, robot, description["simulated"]))
         points = folder / POINTS
         require_points_of(len(kept.data.poses), points)
         # check this before the slow choice of poses, and before a file is made
@@ -202,7 +200,7 @@ def measure(
         places, most = places_of(robot, count, listed, seed), count or MOST_POSES
     with (
         stop_on_signals(HELD) as stop,
-        daemon_run.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+        daemon_run.image_taker(camera, intrinsics, markers, kept, out) as image,
         daemon_run.going_on(kept),
         commanded(daemon, in_control=True) as running,
     ):
@@ -212,10 +210,10 @@ def measure(
         asked = AskedPoints(out, points, len(home_m), operator.place) if ask else None
         criterion = stop_criterion(out, robot, points if ask else None, geometry)
         read_places(
-            out, robot, operator, kept, places, most,
-            criterion if count is None else report_faults_only(criterion),
+            *(out, robot, operator, kept, places, most, criterion),
             asked or (lambda _pose: None),
-        )  # fmt: skip
+            may_end=count is None,
+        )
     out.say("the robot holds the platform at the last pose; `cdpr lower` returns it to its stand")
     result = concluded(
         *(out, robot, kept.data, points if points.exists() else None, geometry),
@@ -244,15 +242,15 @@ def read(
     fifteen poses are needed. `cdpr calibrate measure` moves to poses automatically.
     """
     from cdpr_tools.calibrate import daemon_run  # noqa: PLC0415
-    from cdpr_tools.calibrate.measure_poses import PoseOperator  # noqa: PLC0415
-    from cdpr_tools.calibrate.run import DATA, POINTS  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses  # noqa: PLC0415
+    from cdpr_tools.calibrate.run import POINTS  # noqa: PLC0415  # slow to load
     from cdpr_tools.client.daemon_robot import commanded  # noqa: PLC0415
 
     robot, description = daemon_run.robot_of(daemon)
     data = daemon_run.data_of(out_dir, robot, description["simulated"])
-    kept = daemon_run.DaemonPoses(out_dir, data)
+    kept = StoredPoses(out_dir, data)
     with (
-        daemon_run.image_taker(camera, intrinsics, markers, kept, out.note) as image,
+        daemon_run.image_taker(camera, intrinsics, markers, kept, out) as image,
         commanded(daemon) as running,
     ):
         daemon_run.read_into(PoseOperator(running, robot, image), robot, kept)
@@ -305,20 +303,18 @@ def fit_data(
     either, with status 0.
     """
     from cdpr_rt.calibration.readings import load_data  # noqa: PLC0415
-    from cdpr_tools.calibrate import run as runs  # noqa: PLC0415
     from cdpr_tools.calibrate.finish import concluded, finish, with_hand_eye  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.measure_poses import DATA  # noqa: PLC0415
 
     out = Output(as_json)
     profile = load_robot(robot)
-    compare = None
     if data.is_dir():
-        compare = runs.truth_comparison_of_folder(profile, data)
-        data /= runs.DATA
+        data /= DATA
     read_before = with_hand_eye(load_data(data), hand_eye_of(hand_eye))
     geometry = geometry_of(profile, identify, known_mm, drum_percent, length_mm)
     result = concluded(
         *(out, profile, read_before, points, geometry),
-        *(data, out_dir or data.parent, dry_run, adopt, compare),
+        *(data, out_dir or data.parent, dry_run, adopt),
         hand_eye=hand_eye,
         wanted_mm=wanted_mm,
     )
@@ -429,8 +425,7 @@ def run(
         out, profile, settings, kept, stop_criterion(out, profile, points, geometry)
     )
     result = concluded(
-        *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt),
-        runs.truth_comparison_of(profile, settings, folder),
+        *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt)
     )
     finish(out, result)
 

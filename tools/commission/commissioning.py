@@ -132,7 +132,7 @@ _SPOKEN = {
     "fast": "turns at other speeds",
     "index": "a turn to find the index",
 }
-_METHODS = {
+NAMES = {
     "none": "no compensation",
     "thesis": "thesis' method",
     "harmonic": "harmonic model",
@@ -218,7 +218,7 @@ def spoken_name(name: str) -> str:
     if name.startswith("round"):
         return f"refining, round {int(name.removeprefix('round')) + 1}"
     _, bandwidth, method = name.split("-", 2)
-    return f"validating at {bandwidth.removesuffix('Hz')} Hz, {_METHODS[method]}"
+    return f"validating at {bandwidth.removesuffix('Hz')} Hz, {NAMES[method]}"
 
 
 def _further(advance: Callable[[float], None], done_s: float, time_s: float) -> None:

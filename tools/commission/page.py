@@ -49,10 +49,9 @@ _QUANTITIES = (
 def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified) -> None:
     """Write the report's page and the results beside it.
 
-    Raises WorkFailedError if a file cannot be written, BadInputError for incomplete results or a
-    missing log of the simulator, RawLogError for missing or unusable recordings.
+    Raises WorkFailedError if a file cannot be written, BadInputError for missing recordings or a
+    missing log of the simulator, RawLogError for unusable recordings.
     """
-    _require_complete(results, paths.results)
     save(paths.results, to_json(results, indent=1) + "\n")
     judged, thesis, harmonic = results["validation"], found.thesis, found.harmonic
     on_true_angle = judged["judged_on"] == "true angle"
@@ -170,34 +169,3 @@ def _missed(judged: dict[str, Any], method: str) -> list[_Quantity]:
     """Return the figures in which a method does not reach its targets."""
     goals, got = judged["targets"][method], judged[method]["ratios"]
     return [q for q in _QUANTITIES if got[q.ratio] is not None and got[q.ratio] < goals[q.ratio]]
-
-
-_TOP = (
-    "winch", "drive", "date", "bus", "pid", "latency_s", "bandwidth_Hz", "bandwidths_Hz",
-    "encoder_counts_per_turn", "rated_torque_Nm", "torque_step_Nm",
-)  # fmt: skip
-_IDENTIFICATION = (
-    "orders", "amplitudes_Nm", "confidence_Nm", "phases_deg", "per_pole_pair", "hints",
-    "residual_rms_Nm", "repaired_fraction", "coverage", "excluded_fraction", "error_by_orders_Nm",
-)  # fmt: skip
-
-
-def _require_complete(results: Any, path: Path) -> None:
-    """Raise BadInputError that names the first key missing from `results`."""
-    keys, ratios = [q.key for q in _QUANTITIES], [q.ratio for q in _QUANTITIES]
-    needed = [*_TOP, *(f"identification.{key}" for key in _IDENTIFICATION)]
-    needed += ["validation.judged_on", "validation.bandwidths"]
-    for method in METHODS:
-        for where in ("validation", "validation.encoder"):
-            needed += [f"{where}.{method}.{key}" for key in keys]
-            needed += [f"{where}.{method}.ratios.{key}" for key in ratios]
-    needed += [f"validation.targets.{method}.{key}" for method in METHODS[1:] for key in ratios]
-    needed += [f"validation.floor.{key}" for key in keys]
-    for names in needed:
-        value, passed = results, []
-        for name in names.split("."):
-            passed.append(name)
-            if not isinstance(value, dict) or name not in value:
-                missing = ".".join(passed)
-                raise BadInputError(f"{path}: not the results of a commissioning: no {missing}")
-            value = value[name]

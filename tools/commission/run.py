@@ -11,12 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_drivers.errors import ConfigurationError, DriveFaultError, DriverError
 from cdpr_profiles import Winch, load_winch
-from cdpr_profiles.errors import ProfileError
-from cdpr_rt.errors import ControlError, InterruptedMotionError, InvalidRequestError, TripError
 from cdpr_rt.identification.commissioning_results import Paths, assemble, identify
-from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot, number_in, path_of
+from cdpr_rt.robot import Error, InvalidArgument, number_in, path_of
 from cdpr_tools.commission import summary
 from cdpr_tools.commission.commissioning import (
     DEFAULT_BANDWIDTH_HZ,
@@ -27,7 +24,12 @@ from cdpr_tools.commission.commissioning import (
     Plan,
 )
 from cdpr_tools.composition.session import open_bus, open_winch
-from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError, os_error_as
+from cdpr_tools.errors import (
+    BadInputError,
+    WorkFailedError,
+    errors_for_scripts,
+    os_error_as,
+)
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle
@@ -117,7 +119,7 @@ def commission(
     KeyboardInterrupt. Raises InvalidRobot for the winch's file, InvalidArgument, Faulted if a drive
     or a limit ends the motion, and Error. Call it from the main thread.
     """
-    with _errors_of_commissioning():
+    with errors_for_scripts({"--overwrite": "overwrite=True", "--out": "folder"}):
         for name, text in (("bus", bus), ("index", index), ("safety_io", safety_io)):
             if not isinstance(text, str) and (text is not None or name != "safety_io"):
                 raise InvalidArgument(f"{name}: {text!r}; allowed: a text")
@@ -146,20 +148,3 @@ def _ctrl_c_kept() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _errors_of_commissioning() -> Iterator[None]:
-    try:
-        yield
-    except ProfileError as error:
-        raise InvalidRobot(str(error)) from None
-    except (BadInputError, ConfigurationError, InvalidRequestError) as error:
-        text = str(error).replace("--overwrite", "overwrite=True").replace("--out", "folder")
-        raise InvalidArgument(text) from None
-    except (CommandError, ControlError, DriverError) as error:
-        why = error.__cause__ if isinstance(error, WorkFailedError) else error
-        if isinstance(why, InterruptedMotionError):
-            raise KeyboardInterrupt(str(error)) from None
-        kind = Faulted if isinstance(why, TripError | DriveFaultError) else Error
-        raise kind(str(error)) from None

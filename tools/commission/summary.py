@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from cdpr_rt.identification.commissioning_results import METHODS
+from cdpr_tools.commission.commissioning import NAMES
 from cdpr_tools.output import Output, TableText
-
-_NAMES = {"none": "no compensation", "thesis": "thesis' method", "harmonic": "harmonic model"}
 
 
 def show(out: Output, results: dict[str, Any]) -> None:
@@ -70,7 +69,7 @@ def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float
             f"{figures['peak_velocity_error_deg_s']:.2f} deg/s",
         )
         gains = [f" ({ratio:.1f}x)" if method != "none" else "" for ratio in ratios.values()]
-        rows.append([_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True))])
+        rows.append([NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True))])
     out.say(title, TableText(rows))
 
 
@@ -92,6 +91,5 @@ def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
         ]
         if missed:
             out.say(
-                f"{_NAMES[method]}: below its target in {', '.join(missed)}; the report "
-                "explains why"
+                f"{NAMES[method]}: below its target in {', '.join(missed)}; the report explains why"
             )

@@ -35,7 +35,7 @@ from cdpr_tools.composition.session import Session
 
 COLUMNS = ["time_s", "winding_in", "torque_sent_Nm", "position_rad", "tension_N", "read_s"]
 _TORQUE_SHARE = 0.9
-# torque limit relative to the torque that the highest tension needs by the geometry
+# torque limit relative to the torque that a tension needs by the geometry
 _LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.4
 _TOO_MUCH = 1.25
 # phase that the latency may cost at the crossover of the damping on the rotor alone
@@ -162,16 +162,27 @@ class _Recording:
         return False
 
 
-def _controller(session: Session, plan: AnchorPlan) -> Pid:
-    """Return a soft position loop, damped as far as latency allows on the rotor alone."""
-    winch = session.winch
+def soft_loop(
+    winch: Winch, period_s: float, natural_Hz: float, filter_s: float, limit_Nm: float,
+    mass_kg: float = 0.0,
+) -> Pid:  # fmt: skip
+    """Return a soft position loop for a rotor on an elastic cable, perhaps with a mass on it.
+
+    The proportional gain sets the natural frequency of rotor and mass together. The damping is as
+    high as the latency allows on the rotor alone: above the cable's resonance only the rotor moves.
+    Without integral action a mass is lifted gently and nothing winds up while it stands.
+    """
     inertia = winch.motor.rotor_inertia_kg_m2
-    proportional = inertia * (math.tau * _NATURAL_HZ) ** 2
-    derivative = inertia * _DAMPING_PHASE / winch.latency_s
-    needed_Nm = plan.highest_N * abs(winch.cable_m_per_motor_rad)
-    limit_Nm = min(_LIMIT_RATIO * needed_Nm + _LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
-    gains = PidGains(proportional, 0.0, derivative, _SPEED_FILTER_S)
-    return Pid([gains], np.array([limit_Nm]), session.device.period_s)
+    together = inertia + mass_kg * winch.cable_m_per_motor_rad**2
+    proportional = together * (math.tau * natural_Hz) ** 2
+    gains = PidGains(proportional, 0.0, inertia * _DAMPING_PHASE / winch.latency_s, filter_s)
+    return Pid([gains], np.array([limit_Nm]), period_s)
+
+
+def limit_Nm(winch: Winch, tension_N: float, more_Nm: float) -> float:
+    """Return the torque limit: above what the tension needs by the geometry, at most the rated."""
+    needed_Nm = tension_N * abs(winch.cable_m_per_motor_rad)
+    return min(_LIMIT_RATIO * needed_Nm + more_Nm, winch.motor.rated_torque_Nm)
 
 
 def measure_anchored(
@@ -201,7 +212,9 @@ def measure_anchored(
     try:
         recording = _Recording(session, plan, pull, cell, log)
         out.note(f"winding in to {plan.highest_N:g} N and paying out to {plan.lowest_N:g} N")
-        session.follow(_controller(session, plan), pull, until=recording.cycle)
+        limit = limit_Nm(winch, plan.highest_N, _LIMIT_MORE_Nm)
+        loop = soft_loop(winch, device.period_s, _NATURAL_HZ, _SPEED_FILTER_S, limit)
+        session.follow(loop, pull, until=recording.cycle)
     finally:
         log.close()
     session.disable()
@@ -321,26 +334,6 @@ class _Lowering:
         return self
 
 
-def hoist_controller(
-    inertia_kg_m2: float,
-    mass_inertia_kg_m2: float,
-    latency_s: float,
-    period_s: float,
-    limit_Nm: float,
-) -> Pid:
-    """Return a soft position loop for a rotor with a mass on an elastic cable.
-
-    The proportional gain sets the natural frequency of rotor and mass together. The damping is as
-    high as the latency allows on the rotor alone: above the cable's resonance only the rotor moves.
-    Without integral action the mass is lifted gently and nothing winds up while it stands.
-    """
-    derivative = inertia_kg_m2 * _DAMPING_PHASE / latency_s
-    together = inertia_kg_m2 + mass_inertia_kg_m2
-    proportional = together * (math.tau * _HOIST_NATURAL_HZ) ** 2
-    gains = PidGains(proportional, 0.0, derivative, _FILTER_S)
-    return Pid([gains], np.array([limit_Nm]), period_s)
-
-
 def hoist_points(log: RawLog) -> list[TorquePoint]:
     """Return the torques for raising and for lowering from the recording of a hoist.
 
@@ -394,8 +387,7 @@ def _refuse_uneven(each: FloatArray, winding_in: bool, header: dict[str, Any]) -
 
 # Calibrate a winch with masses that somebody hangs on its cable.
 
-# torque limit relative to the torque that the mass needs by the geometry
-_MASSES_LIMIT_RATIO, _MASSES_LIMIT_MORE_Nm = 1.3, 0.6
+_MASSES_LIMIT_MORE_Nm = 0.6
 _SPEED_RATIO, _LEAST_SPEED_RAD_S = 5.0, 30.0
 
 Hang = Callable[[float, Clock], None]
@@ -497,16 +489,8 @@ def _hoist(
     on_progress: Callable[[float], None],
 ) -> None:
     winch, device = session.winch, session.device
-    per_rad = winch.cable_m_per_motor_rad
-    weight = mass_kg * gravity * abs(per_rad)
-    limit = min(_MASSES_LIMIT_RATIO * weight + _MASSES_LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
-    controller = hoist_controller(
-        winch.motor.rotor_inertia_kg_m2,
-        mass_kg * per_rad**2,
-        winch.latency_s,
-        device.period_s,
-        limit,
-    )
+    limit = limit_Nm(winch, mass_kg * gravity, _MASSES_LIMIT_MORE_Nm)
+    controller = soft_loop(winch, device.period_s, _HOIST_NATURAL_HZ, _FILTER_S, limit, mass_kg)
     meta: dict[str, Any] = {
         "what": "hoist",
         "identity": session.identity,

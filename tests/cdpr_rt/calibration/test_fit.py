@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 from cdpr_profiles import load_robot
 from cdpr_rt.calibration.fit import fit, locate, moved
 from cdpr_rt.calibration.parameters import KINDS, CableGeometry, Knowledge
-from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import encoder_lengths, linearise
 from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.made_up import made_up, measured
@@ -147,14 +146,10 @@ def test_poses_with_the_true_geometry_are_true() -> None:
     assert there.poses == pytest.approx(true, abs=1e-8)
 
 
-def test_missing_poses_and_nan_lengths_are_rejected() -> None:
+def test_missing_poses_are_rejected() -> None:
     what = made_up("planar-4", 5, 1)
     with pytest.raises(InvalidRequestError, match="no poses"):
         fit(what.file, what.seen.some(np.zeros(5, bool)))
-    lengths = what.seen.length_m.copy()
-    lengths[2, 1] = np.nan
-    with pytest.raises(InvalidRequestError, match="pose 3"):
-        Observations.of_lengths(lengths, what.seen.tension_N, what.seen.start)
 
 
 def test_an_unknown_kind_of_parameter_is_rejected() -> None:

@@ -17,8 +17,14 @@ from cdpr_rt.calibration.faults import fit_without_faults, without_slack
 from cdpr_rt.calibration.fit import fit
 from cdpr_rt.calibration.outcome import CalibrationFiles, calibration_of
 from cdpr_rt.calibration.parameters import CableGeometry
-from cdpr_rt.calibration.verdict import open_directions, predicted_std, require_enough
-from cdpr_rt.calibration.verification import Scale, verify, with_more_poses
+from cdpr_rt.calibration.verification import (
+    Scale,
+    open_directions,
+    predicted_std,
+    require_enough,
+    verify,
+    with_more_poses,
+)
 from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.made_up import made_up, measured
 

@@ -23,6 +23,8 @@ from cdpr_rt.errors import TripError
 from cdpr_tools.calibrate import run
 from cdpr_tools.calibrate.finish import stop_criterion
 from cdpr_tools.calibrate.measure_poses import (
+    COUNTED,
+    DATA,
     SETTLE_S,
     NotThePoseError,
     PoseRefusedError,
@@ -31,7 +33,7 @@ from cdpr_tools.calibrate.measure_poses import (
     TargetNotReached,
 )
 from cdpr_tools.calibrate.places import chosen_places
-from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses
+from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -45,7 +47,7 @@ SETUP = CameraSetup(
 TENSION = 60.0
 
 
-class Rig:
+class Rig(RigOperator):
     """A robot whose cables are 4 mm longer after each start."""
 
     started = stuck_at = 0
@@ -92,7 +94,8 @@ class Rig:
         pose = self.geometry.model.poses(self.here[None])
         lengths = encoder_lengths(self.geometry, pose, tension[None])[0] + self.offset
         lengths += self._chance.normal(0.0, 1e-4, lengths.shape)
-        return Readings(np.tile(lengths, (20, 1)), np.tile(tension, (20, 1)), pose[0, 0], 1e-3)
+        measured = {"position_m": tuple(pose[0, 0].tolist()), "position_std_m": 1e-3}
+        return Readings(np.tile(lengths, (20, 1)), np.tile(tension, (20, 1)), measured)
 
     def image(self) -> Sighting | None:
         return Sighting("now", self.sees)
@@ -157,7 +160,7 @@ def test_a_resumed_run_keeps_measured_poses_and_measures_the_rest(
     made = rigs((7, failure))
     with pytest.raises(raised) as caught:
         begin(tmp_path, settings())
-    left = load_data(tmp_path / run.DATA)
+    left = load_data(tmp_path / DATA)
     assert 5 <= len(left.poses) <= 7 and left.restarts == ()
     if raised is not KeyboardInterrupt:
         told = " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
@@ -198,7 +201,7 @@ def test_a_kill_between_two_files_loses_at_most_one_pose(
     rigs()
     data = begin(tmp_path, settings())
     outside = OutsidePoses.load_file(tmp_path / run.OUTSIDE)
-    data.model_copy(update={"poses": data.poses[:9]}).save(tmp_path / run.DATA)
+    data.model_copy(update={"poses": data.poses[:9]}).save(tmp_path / DATA)
     outside.model_copy(update={"poses": outside.poses[:10]}).save(tmp_path / run.OUTSIDE)
     again = go_on(tmp_path, settings())
     assert len(again.poses) == 15 and again.restarts == (9,)
@@ -290,7 +293,7 @@ def test_a_read_pose_is_kept_if_the_longer_scan_is_interrupted(
     monkeypatch.setattr(run.StoredRun, "add", add)
     with pytest.raises(TripError, match="ended"):
         begin(tmp_path, settings())
-    left = load_data(tmp_path / run.DATA)
+    left = load_data(tmp_path / DATA)
     assert len(left.poses) == 5 and not left.tried
     assert len(OutsidePoses.load_file(tmp_path / run.OUTSIDE).poses) == 5
     data = go_on(tmp_path, settings())
@@ -305,7 +308,7 @@ def test_an_unreachable_place_is_read_where_the_platform_stops_and_not_retried(
     with pytest.raises(WorkFailedError):
         begin(tmp_path, settings())
     Rig.stuck_at = 0
-    left = load_data(tmp_path / run.DATA)
+    left = load_data(tmp_path / DATA)
     missed = tuple(made[0].gone[5].tolist())
     assert left.tried == (missed,) and not left.left_out
     assert missed not in {reading.target for reading in left.poses}
@@ -322,7 +325,7 @@ def test_a_place_at_which_a_fault_ended_the_motion_is_not_retried(
     rigs((7, TripError("the motion was ended: fault")))
     with pytest.raises(TripError):
         begin(tmp_path, settings())
-    left = load_data(tmp_path / run.DATA)
+    left = load_data(tmp_path / DATA)
     assert "fault" in left.left_out[-1]
     data = go_on(tmp_path, settings())
     assert len(data.poses) == 15
@@ -361,7 +364,7 @@ def test_images_that_never_show_two_markers_end_the_run_after_a_batch(
     criterion = stop_criterion(Output(True), ROBOT, None, CableGeometry.of(ROBOT))
     with pytest.raises(WorkFailedError, match="no image shows two markers together"):
         run.measure(Output(True), ROBOT, settings(), kept, criterion)
-    assert len(load_data(tmp_path / run.DATA).poses) == 11  # home and ten places
+    assert len(load_data(tmp_path / DATA).poses) == 11  # home and ten places
 
 
 def test_a_new_run_deletes_poses_of_the_previous_run(
@@ -370,11 +373,11 @@ def test_a_new_run_deletes_poses_of_the_previous_run(
     rigs()
     begin(tmp_path, settings())
     (tmp_path / run.IMAGES).mkdir()
-    for name in (f"{run.IMAGES}/pose-0015.png", run.COUNTED):
+    for name in (f"{run.IMAGES}/pose-0015.png", COUNTED):
         (tmp_path / name).write_text("of before")
     run.StoredRun.new(tmp_path, ROBOT, SETUP)
-    assert [path.name for path in tmp_path.iterdir()] == [run.DATA]
-    assert not run.load_data(tmp_path / run.DATA).poses
+    assert [path.name for path in tmp_path.iterdir()] == [DATA]
+    assert not load_data(tmp_path / DATA).poses
 
 
 def test_a_run_that_ended_before_its_first_pose_can_be_resumed(
@@ -388,7 +391,7 @@ def test_a_run_that_ended_before_its_first_pose_can_be_resumed(
     )
 
 
-@pytest.mark.parametrize("name", [run.IMAGES, run.DATA, run.SETTINGS, run.OUTSIDE, run.COUNTED])
+@pytest.mark.parametrize("name", [run.IMAGES, DATA, run.SETTINGS, run.OUTSIDE, COUNTED])
 def test_a_run_rejects_a_folder_with_files_of_the_user(tmp_path: Path, name: str) -> None:
     kept = tmp_path / name / "pose-0001.png" if name == run.IMAGES else tmp_path / name
     kept.parent.mkdir(exist_ok=True)
@@ -408,10 +411,10 @@ def test_a_new_run_keeps_files_of_the_user_among_its_images(tmp_path: Path) -> N
 
 def test_a_simulation_does_not_overwrite_readings_of_a_real_robot(tmp_path: Path) -> None:
     kept = run.StoredRun.new(tmp_path, ROBOT, None)
-    kept.data.model_copy(update={"simulated": False}).save(tmp_path / run.DATA)
+    kept.data.model_copy(update={"simulated": False}).save(tmp_path / DATA)
     with pytest.raises(BadInputError, match="contains readings of a real robot"):
         run.StoredRun.new(tmp_path, ROBOT, None)
-    assert (tmp_path / run.DATA).exists()
+    assert (tmp_path / DATA).exists()
 
 
 def test_data_of_a_changed_robot_cannot_be_resumed(
@@ -419,6 +422,6 @@ def test_data_of_a_changed_robot_cannot_be_resumed(
 ) -> None:
     rigs()
     data = begin(tmp_path, settings())
-    data.model_copy(update={"geometry_sha256": "0" * 64}).save(tmp_path / run.DATA)
+    data.model_copy(update={"geometry_sha256": "0" * 64}).save(tmp_path / DATA)
     with pytest.raises(BadInputError, match="another version of 'planar-4'"):
         go_on(tmp_path, settings())

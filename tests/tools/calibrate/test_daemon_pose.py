@@ -16,7 +16,7 @@ from cdpr_profiles.geometry_calibration import geometry_sha256
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CalibrationData, load_data
 from cdpr_tools.calibrate import daemon_run, pose_camera, run
-from cdpr_tools.calibrate.measure_poses import PoseOperator, TakeImage
+from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses, TakeImage
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
@@ -73,10 +73,10 @@ def read(told: StandingDaemon, folder: Path, image: TakeImage | None = None) -> 
     return kept.data
 
 
-def kept_in(told: StandingDaemon, folder: Path) -> tuple[Robot, daemon_run.DaemonPoses]:
+def kept_in(told: StandingDaemon, folder: Path) -> tuple[Robot, StoredPoses]:
     robot, description = daemon_run.robot_of(told)  # type: ignore[arg-type]
     data = daemon_run.data_of(folder, robot, description["simulated"])
-    return robot, daemon_run.DaemonPoses(folder, data)
+    return robot, StoredPoses(folder, data)
 
 
 def test_poses_are_appended_and_restarted_lengths_detected(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def of_a_run(told: StandingDaemon, folder: Path) -> None:
     """Store a run that was started with --overwrite over poses read by hand."""
     told.description["simulated"] = True  # as in all runs
     read(told, folder)
-    run.StoredRun.new(folder, ROBOT, None).data.save(folder / run.DATA)
+    run.StoredRun.new(folder, ROBOT, None).data.save(folder / DATA)
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,9 @@ from cdpr_rt.calibration.readings import load_data
 from cdpr_rt.calibration.residuals import encoder_lengths
 from cdpr_rt.errors import TripError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
-from cdpr_tools.calibrate import daemon_run
 from cdpr_tools.calibrate.check import checked_running
 from cdpr_tools.calibrate.daemon_run import going_on
-from cdpr_tools.calibrate.measure_poses import PoseOperator
+from cdpr_tools.calibrate.measure_poses import PoseOperator, StoredPoses
 from cdpr_tools.calibrate.places import Places
 from cdpr_tools.calibrate.run import read_places
 from cdpr_tools.client.client import ConnectionLostError
@@ -120,7 +119,7 @@ class Measurement:
         self.ask = self.asked.append
         self.stopped = False
 
-    def run(self, wanted: int = 5) -> daemon_run.DaemonPoses:
+    def run(self, wanted: int = 5) -> StoredPoses:
         robot, kept = kept_in(self.daemon, self.folder)
         places = Places(np.array([0.0, 1.5, 0.0]), np.array(PLACES))
         out = Output(as_json=False)

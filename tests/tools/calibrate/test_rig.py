@@ -12,14 +12,15 @@ from cdpr_profiles import load_robot
 from cdpr_rt.errors import TripError
 from cdpr_tools.calibrate import measure_poses as measuring
 from cdpr_tools.calibrate.measure_poses import (
-    Measured,
     NotThePoseError,
     StoppedError,
+    StoredPoses,
     measure_poses,
     read_pose,
 )
 from cdpr_tools.calibrate.places import chosen_places
 from cdpr_tools.calibrate.rig import OutsidePose, simulated_rig
+from cdpr_tools.calibrate.run import no_poses
 
 pytestmark = [pytest.mark.long, pytest.mark.usefixtures("slower_profiles")]
 
@@ -29,6 +30,10 @@ exit_errors_m = [[0.006, 0.0], [0.0, -0.006], [0.0, 0.005]]
 [scanner]
 position_sigma_m = 0.0005
 """
+
+
+def stored(folder: Path) -> StoredPoses:
+    return StoredPoses(folder, no_poses(load_robot("planar-3"), True))
 
 
 class Notes:
@@ -42,11 +47,12 @@ def test_home_and_poses_are_read_and_measured(tmp_path: Path) -> None:
     places = chosen_places(load_robot("planar-3"), 6, 3)
     outside: list[OutsidePose] = []
     with simulated_rig("planar-3", plant=plant, scanner=True) as operator:
-        measured = Measured(lambda: outside.append(operator.outside()))
-        measured.add(read_pose(operator, operator.tighten()))
+        measured = stored(tmp_path)
+        measured.added = lambda _: outside.append(operator.outside())
+        measured.add(read_pose(operator, operator.tighten()), operator)
         measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
-    assert len(measured.readings) == len(outside) == 3
-    for reading, other in zip(measured.readings, outside, strict=True):
+    assert len(measured.data.poses) == len(outside) == 3
+    for reading, other in zip(measured.data.poses, outside, strict=True):
         assert reading.position_m is not None
         off = np.array(reading.position_m[:2]) - np.array(reading.target[:2])
         # the true exit points differ from the file by some millimetres
@@ -70,7 +76,7 @@ def test_a_stop_request_is_obeyed_between_two_cycles() -> None:
 
 
 def test_a_pose_not_reached_in_time_is_read_where_the_platform_is_held(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     places, said = chosen_places(load_robot("planar-3"), 3, 3), list[str]()
     first, second = places.chosen[:2]
@@ -83,15 +89,15 @@ def test_a_pose_not_reached_in_time_is_read_where_the_platform_is_held(
         operator.tighten()
         monkeypatch.setattr(measuring, "_SLOWED", 0.3)
         monkeypatch.setattr(measuring, "_LATE_S", 0.0)
-        measured = Measured(lambda: None)
+        measured = stored(tmp_path)
         measure_poses(operator, [first], places.middle, measured, Noted())
         true = operator.rig.truth()["position_m"][:2].copy()
         monkeypatch.undo()
         measure_poses(operator, [second], places.middle, measured, Noted())
-    stood, other = measured.readings
+    stood, other = measured.data.poses
     assert np.linalg.norm(np.array(stood.target) - first) > 0.1
     assert np.array(stood.target) == pytest.approx(true, abs=0.01)
-    assert measured.tried == [tuple(first.tolist())] and measured.failures == 0
+    assert measured.data.tried == (tuple(first.tolist()),) and measured.failures == 0
     assert other.target == tuple(second.tolist())
     assert len(said) == 1 and said[0].startswith("pose 1, at ")
     assert "is read where the platform stands" in said[0] and "mm off after" in said[0]
@@ -99,13 +105,13 @@ def test_a_pose_not_reached_in_time_is_read_where_the_platform_is_held(
 
 @pytest.mark.parametrize("when", ["on its way", "before it is read", "while it is read"])
 def test_an_emergency_stop_does_not_mark_the_pose_as_tried(
-    when: str, monkeypatch: pytest.MonkeyPatch
+    when: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
         rig = operator.rig
-        measured, pressed_s = Measured(lambda: None), list[float]()
+        measured, pressed_s = stored(tmp_path), list[float]()
         name = {"on its way": "move_to", "before it is read": "wait", "while it is read": "read"}[
             when
         ]
@@ -126,19 +132,19 @@ def test_an_emergency_stop_does_not_mark_the_pose_as_tried(
         monkeypatch.setattr(operator, name, pressing)
         with pytest.raises(NotThePoseError, match="emergency stop"):
             measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
-        assert pressed_s and not measured.tried and not measured.readings
+        assert pressed_s and not measured.data.tried and not measured.data.poses
         monkeypatch.undo()
         with pytest.raises(NotThePoseError):  # during the fault, no pose is marked either
             operator.move_to(places.middle)
 
 
 def test_a_drive_fault_during_the_motion_marks_the_pose_as_tried(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
-        measured, begin = Measured(lambda: None), operator.robot.move_to
+        measured, begin = stored(tmp_path), operator.robot.move_to
 
         def failing(*arguments: Any, **options: Any) -> None:
             begin(*arguments, **options)
@@ -148,15 +154,17 @@ def test_a_drive_fault_during_the_motion_marks_the_pose_as_tried(
         with pytest.raises(TripError) as caught:
             measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
     assert not isinstance(caught.value, NotThePoseError)
-    assert measured.tried == [tuple(places.chosen[0].tolist())]
+    assert measured.data.tried == (tuple(places.chosen[0].tolist()),)
 
 
-def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried() -> None:
+def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried(
+    tmp_path: Path,
+) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
-        measured = Measured(lambda: None)
+        measured = stored(tmp_path)
         operator.rig.inject(1, 1, 0x2310)
         with pytest.raises(NotThePoseError):
             measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
-    assert measured.tried == []
+    assert measured.data.tried == ()

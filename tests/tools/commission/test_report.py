@@ -202,28 +202,6 @@ def copy_of(made: Commissioned, folder: Path) -> Paths:
     return Paths(folder)
 
 
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [
-        (("pid",), "no pid"),
-        (("identification", "hints"), "no identification.hints"),
-        (("validation", "harmonic", "ratios"), "no validation.harmonic.ratios"),
-        (("validation", "floor", "peak_pid_effort_Nm"), "no validation.floor.peak_pid_effort_Nm"),
-    ],
-)
-def test_error_for_incomplete_results_names_the_missing_key(
-    quick: Commissioned, winch: Winch, tmp_path: Path, keys: tuple[str, ...], told: str
-) -> None:
-    results = assembled(quick)
-    table = results
-    for key in keys[:-1]:
-        table = table[key]
-    del table[keys[-1]]
-    with pytest.raises(BadInputError, match=re.escape(told)):
-        build(Paths(tmp_path), winch, results, quick.found)
-    assert not list(tmp_path.iterdir())
-
-
 def test_missing_and_damaged_recordings_are_named(
     quick: Commissioned, winch: Winch, tmp_path: Path
 ) -> None:
