@@ -1,5 +1,4 @@
-"""Make a calibration from observations, verify it, and move it into the frame of the robot's
-file."""
+"""Make a calibration from observations, and move it into the frame of the robot's file."""
 
 from __future__ import annotations
 
@@ -201,8 +200,8 @@ def _with_camera(
 
 def _with_hand_eye(geometry: CableGeometry, found: Fit, given: CameraKnowledge) -> Fit:
     """Return the fit with the hand-eye transform from its file."""
-    assert found.camera is not None
-    camera = found.camera.with_hand_eye(given.position_m, given.rotation, given.hand_eye_std)
+    camera = found.fitted_camera
+    camera = camera.with_hand_eye(given.position_m, given.rotation, given.hand_eye_std)
     known = replace(geometry, knowledge=found.geometry.knowledge)
     seen = replace(found.seen, start=found.poses)
     return fit(known, seen, start=found.geometry, camera=camera)

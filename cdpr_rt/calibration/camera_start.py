@@ -319,8 +319,7 @@ def with_seen_poses(
     Images that show fewer than two markers of the map are ignored. Raises InvalidRequestError
     if all images are ignored.
     """
-    camera = made.camera
-    assert camera is not None  # the calibration used one
+    camera = made.fitted_camera
     of_markers = made.camera_std[camera.first_marker :].reshape(-1, 6)
     placed = of_markers[:, :3].max(axis=1) < _PLACED_m
     markers = markers_of_map(camera.ids, placed, sheets, sightings)

@@ -231,15 +231,13 @@ class _System:
         return self._solve(columns)[2] / float(max(self._freedom - used, 1))
 
     def _noise(self, columns: Sequence[IntArray]) -> float:
-        """Return the variance of the remaining residuals, but no more than is assumed for
-        readings."""
+        """Return the variance of the remaining residuals, at most that assumed for readings."""
         return min(max(self.misfit(columns), _LEAST_NOISE), 1.0)
 
     def best(
         self, columns: Sequence[IntArray]
     ) -> tuple[str, int, int, tuple[int, ...], IntArray] | None:
-        """Return the further change that explains most of the residuals; None if it is
-        uncertain."""
+        """Return the further change that explains most of the residuals; None if uncertain."""
         before = self._solve(columns)[2]
         gains = {}
         for key, own in self._own.items():

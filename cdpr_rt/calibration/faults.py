@@ -426,8 +426,7 @@ def hand_eye_fault(
     of the fit. The given pose is wrong if the largest coordinate of d, or d^T (P + C)^-1 d, is
     improbably large.
     """
-    camera = found.camera
-    assert camera is not None
+    camera = found.fitted_camera
     first = found.geometry.size + found.jumps_m.size
     covariance = found.uncertainty[first : first + SIZE, first : first + SIZE]
     covariance = covariance + np.diag(given.hand_eye_std**2)
@@ -483,8 +482,6 @@ def free_wrong_values(
     It also takes into account exit points measured by tape, known marker poses and measured points.
     If two explanations fit equally well, the cause remains unknown and the fit is unchanged.
     """
-    camera = found.camera
-    assert camera is not None
     if not _contradiction(geometry, found, first):
         return found, []
     tried = [_tried(geometry, found, (kind,)) for kind in _COUNTS]
@@ -524,8 +521,7 @@ class _Cause:
 
 def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) -> _Cause:
     """Return an explanation: the fit with these values set free."""
-    camera = found.camera
-    assert camera is not None
+    camera = found.fitted_camera
     seen = replace(found.seen, start=found.poses)
     known: dict[str, Any] = {}
     if "size" in kinds:
@@ -556,8 +552,7 @@ def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:
 
 def _contradiction(geometry: CableGeometry, found: Fit, first: MapFit) -> bool:
     """Return whether a given value of sheets, drums or lens is far from the fitted one."""
-    camera = found.camera
-    assert camera is not None
+    camera = found.fitted_camera
     free, known = camera.free_lens, camera.knowledge
     off = [abs(camera.size_change) / known.size_std, float(not len(free) and first.lens.wrong) * 9]
     off += (np.abs(camera.lens - known.lens)[free] / known.lens_std[free]).tolist()
@@ -575,8 +570,7 @@ def _all_drums(geometry: CableGeometry, found: Fit) -> bool:
 
 def _cause(kind: FaultKind, found: Fit) -> tuple[float, str]:
     """Return the relative size of a cause, and the cause as text."""
-    camera = found.camera
-    assert camera is not None
+    camera = found.fitted_camera
     if kind == "size":
         size = camera.size_change
         how = "larger" if size > 0.0 else "smaller"

@@ -222,6 +222,12 @@ class Fit:
     camera: CameraModel | None = None
 
     @property
+    def fitted_camera(self) -> CameraModel:
+        """The camera of a fit that has one."""
+        assert self.camera is not None
+        return self.camera
+
+    @property
     def inflation(self) -> float:
         """Ratio of the covariance to the one that the assumed standard deviations give."""
         return max(self.variance_factor, self.corner_factor, 1.0)

@@ -327,10 +327,7 @@ class Board:
             )
         try:
             return cv2.aruco.CharucoBoard(
-                (self.columns, self.rows),
-                self.square_m,
-                self.marker_m,
-                dictionary,
+                (self.columns, self.rows), self.square_m, self.marker_m, dictionary
             )
         except cv2.error:
             raise InvalidRequestError(

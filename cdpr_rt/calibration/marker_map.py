@@ -78,10 +78,7 @@ class SeenMarkers:
     def keep(self, kept: BoolArray) -> SeenMarkers:
         """Return only the seen markers with `kept` (n,) true; names and ids do not change."""
         return replace(
-            self,
-            image=self.image[kept],
-            marker=self.marker[kept],
-            corners_px=self.corners_px[kept],
+            self, image=self.image[kept], marker=self.marker[kept], corners_px=self.corners_px[kept]
         )
 
     def of_images(self, chosen: IntArray) -> SeenMarkers:

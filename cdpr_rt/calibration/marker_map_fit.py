@@ -386,10 +386,7 @@ def placed_along_tree(pairs: list[Pair], count: int, start: int) -> tuple[FloatA
     if not pairs:
         return position, rotation
     graph: Any = csr_array(
-        (
-            [one.cost for one in pairs],
-            ([one.a for one in pairs], [one.b for one in pairs]),
-        ),
+        ([one.cost for one in pairs], ([one.a for one in pairs], [one.b for one in pairs])),
         shape=(count, count),
     )
     cost, before = dijkstra(graph, directed=False, indices=[start], return_predecessors=True)

@@ -261,10 +261,7 @@ def _thinned(seen: Observations, every: int) -> Observations:
 
 
 def _rescaled(
-    found: Fit,
-    seen: Observations,
-    least_m: float,
-    points: tuple[FloatArray, FloatArray],
+    found: Fit, seen: Observations, least_m: float, points: tuple[FloatArray, FloatArray]
 ) -> tuple[CableGeometry, Observations, bool]:
     """Return geometry and readings with the noise from the residuals, and whether it is unchanged.
 

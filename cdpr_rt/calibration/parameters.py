@@ -105,10 +105,7 @@ class CableGeometry:
 
     @classmethod
     def of(
-        cls,
-        robot: Robot,
-        identified: Iterable[str] = USUAL,
-        knowledge: Knowledge | None = None,
+        cls, robot: Robot, identified: Iterable[str] = USUAL, knowledge: Knowledge | None = None
     ) -> Self:
         """Return the geometry of a robot's file.
 

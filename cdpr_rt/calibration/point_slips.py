@@ -370,9 +370,7 @@ def _of_robot(file: CableGeometry, model: _ByLengths, null: _Score) -> list[tupl
 
 
 def _slips(points: Points, model: _ByLengths, null: _Score) -> Iterator[_Slip]:
-    """Yield the slips to try: scale and origin, and all others if `null` contradicts the
-    lengths.
-    """
+    """Yield the slips to try: scale and origin, and the others if lengths contradict `null`."""
     place = np.nan_to_num(points.place_m)
     count, k = place.shape
     shift = _SHIFT_m * np.tile(np.eye(k), (count, 1, 1))

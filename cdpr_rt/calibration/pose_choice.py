@@ -8,12 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray, IntArray
-from cdpr_rt.calibration.parameters import (
-    CABLE_ROWS,
-    CableGeometry,
-    Knowledge,
-    ParameterKind,
-)
+from cdpr_rt.calibration.parameters import CABLE_ROWS, CableGeometry, Knowledge, ParameterKind
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.calibration.residuals import encoder_lengths, linearise
 from cdpr_rt.model.cable_kernel import CABLE_ROWS as KERNEL_ROWS

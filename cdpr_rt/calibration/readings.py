@@ -228,10 +228,7 @@ class Observations:
         std = np.where(known, np.broadcast_to(std_m, measured.shape), np.inf)
         point = np.zeros(3) if target_m is None else np.array(target_m, float)
         return replace(
-            self,
-            position_m=np.where(known, measured, 0.0),
-            position_std_m=std,
-            target_m=point,
+            self, position_m=np.where(known, measured, 0.0), position_std_m=std, target_m=point
         )
 
     def with_rotations(self, rotation: FloatArray, std_rad: FloatArray | float) -> Observations:
@@ -240,9 +237,7 @@ class Observations:
         known = np.isfinite(measured).all(axis=(1, 2))
         std = np.where(known[:, None], np.broadcast_to(std_rad, (len(measured), 3)), np.inf)
         return replace(
-            self,
-            rotation=np.where(known[:, None, None], measured, np.eye(3)),
-            rotation_std_rad=std,
+            self, rotation=np.where(known[:, None, None], measured, np.eye(3)), rotation_std_rad=std
         )
 
     def unmeasured(self) -> Observations:

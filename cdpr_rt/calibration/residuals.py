@@ -38,14 +38,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera_geometry import cross_matrices
-from cdpr_rt.calibration.parameters import (
-    ANCHORS,
-    CABLE_ROWS,
-    DRUM,
-    EXIT,
-    OFFSET,
-    CableGeometry,
-)
+from cdpr_rt.calibration.parameters import ANCHORS, CABLE_ROWS, DRUM, EXIT, OFFSET, CableGeometry
 from cdpr_rt.calibration.readings import Observations
 from cdpr_rt.model.cable_kernel import (
     ANCHOR,

@@ -186,8 +186,7 @@ measure."""
 
 @dataclass(frozen=True)
 class Predicted3Sigma:
-    """Accuracy of poses from lengths with an identified geometry: 3 sigma of the worst
-    coordinate."""
+    """Accuracy of poses from lengths: 3 sigma of the worst coordinate."""
 
     position_mm: float
     orientation_deg: float | None
@@ -655,14 +654,9 @@ class Unused:
     reference: Reference | None
     """Reference for poses that a camera saw; None without a camera."""
 
-    @property
-    def jumps_m(self) -> FloatArray:
-        """Sizes of the jumps of `seen`, (j,)."""
-        return self.part.jumps_m
-
     def verified(self) -> Verification:
         """Return the errors of the fit to the other poses."""
-        return self._compared(self.part.geometry, self.jumps_m)
+        return self._compared(self.part.geometry)
 
     def before(self, file: CableGeometry) -> Verification:
         """Return the errors of the geometry in the robot's file.
@@ -670,7 +664,7 @@ class Unused:
         Jumps are errors of the readings, not of the file, so they are corrected here too. Otherwise
         lengths would contradict the file after the encoders began to count again.
         """
-        return self._compared(file, self.jumps_m)
+        return self._compared(file)
 
     def honesty(self) -> Honesty:
         """Return actual and predicted errors against measured points.
@@ -679,7 +673,7 @@ class Unused:
         measurement.
         """
         part, seen = self.part, self.seen
-        there = locate(part.geometry, seen.without_jumps(self.jumps_m))
+        there = locate(part.geometry, seen.without_jumps(part.jumps_m))
         k = part.geometry.coordinates
         known = np.isfinite(seen.position_std_m[:, :k])
         if not known.any():
@@ -693,13 +687,13 @@ class Unused:
         actual, predicted = (1e3 * math.sqrt(float(x.mean())) for x in (squares, variance[known]))
         return Honesty(actual, predicted, ratio)
 
-    def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
+    def _compared(self, geometry: CableGeometry) -> Verification:
         """Return the errors of poses from lengths alone with a geometry.
 
         If the camera is the reference, its pose on the platform and the pose of its map in the room
         are those that fit this geometry best at the used poses.
         """
-        reference = self.reference
+        reference, jumps_m = self.reference, self.part.jumps_m
         if reference is None or verifies(self.seen):
             return verify(geometry, jumps_m, self.seen)
         used = self.part.seen.unmeasured().without_jumps(jumps_m)

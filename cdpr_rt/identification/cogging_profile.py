@@ -169,8 +169,7 @@ class CoggingProfile(_Part):
         return profile
 
     def require_true_of(self, bounds: MotorBounds) -> None:
-        """Raise CoggingProfileError if the profile belongs to another motor, or is impossible for
-        this one.
+        """Raise CoggingProfileError if the profile cannot be of this motor.
 
         The message gives key, value and allowed values.
         """
@@ -220,9 +219,7 @@ OBSERVER_s = 0.003
 
 
 def stored_thesis(result: ThesisResult) -> StoredMethod:
-    """Return the thesis' curves for storage; they apply at the encoder's angle, without
-    look-ahead.
-    """
+    """Return the thesis' curves for storage; they apply at the encoder's angle."""
     return _stored(result, 0.0, 0.0)
 
 

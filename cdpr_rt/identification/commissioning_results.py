@@ -106,9 +106,7 @@ evaluated."""
 
 
 def judge(paths: Sequence[Path], angle_of: AngleOf | None) -> ValidationMetrics:
-    """Return the worst value of each figure over the passes; by default with the encoder's
-    angle.
-    """
+    """Return the worst value of each figure over the passes; by default by the encoder."""
     figures = []
     for path in paths:
         log = read_raw_log(path)

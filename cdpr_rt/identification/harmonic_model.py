@@ -412,9 +412,7 @@ def _left(
 
 
 def _correlated_sum(left: FloatArray) -> float:
-    """Return the sum of products of residuals at distances 1, 2, ... until they are
-    uncorrelated.
-    """
+    """Return the sum of products of residuals at distances 1, 2, ... while they correlate."""
     total, square = 0.0, float(left @ left)
     for distance in range(1, min(_MOST_CORRELATED, left.size // 4)):
         product = float(left[distance:] @ left[:-distance])

@@ -283,9 +283,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
 
 
 def _smoothing_s(noise_rad: float, speed_rad_s: float, least_s: float, most_s: float) -> float:
-    """Return the standard deviation of the smoothing filter for a run's deviation from its
-    set-point.
-    """
+    """Return the standard deviation of the filter for the deviation from the set-point."""
     quick = speed_rad_s > _QUICK_rad_s
     wanted_s = _SMOOTHING * noise_rad / (speed_rad_s if quick else _SMOOTHING_SPEED_rad_s)
     return min(max(wanted_s, least_s if quick else _SMOOTHING_s), most_s)
@@ -300,9 +298,7 @@ def _smoothed(run: SweepData, width: float, period: float) -> tuple[FloatArray, 
 
 
 def _smoothed_torque(run: SweepData, latency: float, step: int) -> FloatArray:
-    """Return the torque at the time when it acts, some cycles after sending, smoothed over
-    windows.
-    """
+    """Return the torque when it acts, some cycles after sending, smoothed over windows."""
     cycle = np.arange(run.time_s.size)
     torque = np.convolve(np.interp(cycle - latency, cycle, run.torque_Nm), _HELD, mode="same")
     for _ in range(4):
@@ -578,9 +574,7 @@ def matrix(windows: Windows, layout: ColumnLayout, first: int, last: int) -> Flo
 
 
 def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
-    """Number the kinds of rows by the speed of their run, because noise differs; -1 means left
-    out.
-    """
+    """Number the kinds of rows by the speed of their run, which noise depends on; -1: left out."""
     speeds = sorted({round(float(np.rad2deg(w.cruise_rad_s)), 1) for w in windows})
     numbered = []
     for w in windows:

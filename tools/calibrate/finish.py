@@ -15,12 +15,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.geometry_calibration import GeometryCalibration
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.marker_map import coverage
-from cdpr_rt.calibration.outcome import (
-    CalibrationFiles,
-    CalibrationMethod,
-    Outcome,
-    calibration_of,
-)
+from cdpr_rt.calibration.outcome import CalibrationFiles, CalibrationMethod, Outcome, calibration_of
 from cdpr_rt.calibration.parameters import CableGeometry
 from cdpr_rt.calibration.readings import CalibrationData, HandEye, Images, with_points
 from cdpr_rt.diagnosis.checks import refuse_impossible

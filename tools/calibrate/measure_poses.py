@@ -61,9 +61,7 @@ class NotThePoseError(TripError):
 
 @dataclass(frozen=True)
 class TargetNotReached:
-    """The platform has not reached its target in time; the robot holds it at its present
-    position.
-    """
+    """The platform has not reached its target in time, and is held where it is."""
 
     place: FloatArray
     """Present position (d,), according to the controller."""

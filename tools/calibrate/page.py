@@ -154,8 +154,7 @@ def held_out_figure(comparison: TruthComparison) -> Figure:
 
 def markers_figure(found: Fit) -> Figure:
     """Draw markers from above with their relative uncertainty, and the camera."""
-    camera, poses = found.camera, found.poses
-    assert camera is not None  # only drawn for a calibration with a camera
+    camera, poses = found.fitted_camera, found.poses
     placed, std_m = _known_to(found, camera)
     known_m = 3.0 * std_m
     figure, (ax,) = style.canvas(height=4.6)

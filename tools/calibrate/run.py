@@ -44,13 +44,7 @@ from cdpr_tools.calibrate.measure_poses import (
     measure_poses,
     read_pose,
 )
-from cdpr_tools.calibrate.places import (
-    MOST_POSES,
-    Listed,
-    Places,
-    listed_places,
-    places_of,
-)
+from cdpr_tools.calibrate.places import MOST_POSES, Listed, Places, listed_places, places_of
 from cdpr_tools.calibrate.rig import OutsidePose, OutsidePoses, RigOperator, simulated_rig
 from cdpr_tools.calibrate.truth_comparison import TruthComparison, compare_with_truth
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -361,11 +355,7 @@ def read_places(
 
 
 def _read_home(
-    out: Output,
-    robot: Robot,
-    operator: PoseOperator,
-    kept: StoredPoses,
-    home: FloatArray | None,
+    out: Output, robot: Robot, operator: PoseOperator, kept: StoredPoses, home: FloatArray | None
 ) -> None:
     """Read home; report camera problems before the robot moves far. Raises WorkFailedError."""
     if home is None:

@@ -157,7 +157,7 @@ def compare_with_truth(
         np.concatenate(
             [
                 locate(geometry, part.seen.some(np.arange(1)).without_jumps(part.jumps_m)).poses,
-                locate(geometry, unused.seen.without_jumps(unused.jumps_m)).poses[some],
+                locate(geometry, unused.seen.without_jumps(part.jumps_m)).poses[some],
             ]
         )
         for geometry in (part.geometry, CableGeometry.of(robot))

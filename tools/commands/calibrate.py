@@ -21,7 +21,7 @@ from cdpr_tools.signals import HELD, stop_on_signals
 
 if TYPE_CHECKING:
     from cdpr_rt.calibration.parameters import CableGeometry
-    from cdpr_rt.calibration.readings import CameraSetup, HandEye
+    from cdpr_rt.calibration.readings import HandEye
 
 
 # Options shared by several commands of `cdpr calibrate`, and their evaluation.
@@ -407,7 +407,8 @@ def run(
         source = source_of(
             profile, camera=camera, redundancy=redundancy, scanner=scanner, points=bool(points)
         )
-        _require_camera(known, source)
+        if known is not None and source != "camera":
+            raise BadInputError("--hand-eye: allowed only with --camera")
         settings = runs.CalibrationRunSettings(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
@@ -417,7 +418,11 @@ def run(
             places=listed,
             points=None if points is None else str(points.resolve()),
         )
-        setup = _camera_setup(out, plant, intrinsics, markers) if source == "camera" else None
+        setup = None
+        if source == "camera":
+            from cdpr_tools.calibrate.pose_camera import camera_setup  # noqa: PLC0415  # needs an extra
+
+            setup = camera_setup(out, plant, intrinsics, markers)
         kept = runs.StoredRun.new(folder, profile, setup)
     settings.save(folder)
     kept.data = with_hand_eye(kept.data, known)
@@ -437,20 +442,6 @@ def _require_as_begun(given: Mapping[str, object]) -> None:
             raise BadInputError(
                 f"{name}: not together with --resume, which continues with the options of the run"
             )
-
-
-def _require_camera(hand_eye: HandEye | None, source: str) -> None:
-    if hand_eye is not None and source != "camera":
-        raise BadInputError("--hand-eye: allowed only with --camera")
-
-
-def _camera_setup(
-    out: Output, plant: Path | None, intrinsics: Path | None, markers: Path | None
-) -> CameraSetup:
-    """Return the camera's setup for a new run; its module needs an extra."""
-    from cdpr_tools.calibrate.pose_camera import camera_setup  # noqa: PLC0415
-
-    return camera_setup(out, plant, intrinsics, markers)
 
 
 def _require_new(folder: Path, name: str, overwrite: bool) -> None:

@@ -132,11 +132,7 @@ _SPOKEN = {
     "fast": "turns at other speeds",
     "index": "a turn to find the index",
 }
-NAMES = {
-    "none": "no compensation",
-    "thesis": "thesis' method",
-    "harmonic": "harmonic model",
-}
+NAMES = {"none": "no compensation", "thesis": "thesis' method", "harmonic": "harmonic model"}
 
 
 class Measurement:

@@ -24,12 +24,7 @@ from cdpr_tools.commission.commissioning import (
     Plan,
 )
 from cdpr_tools.composition.session import open_bus, open_winch
-from cdpr_tools.errors import (
-    BadInputError,
-    WorkFailedError,
-    errors_for_scripts,
-    os_error_as,
-)
+from cdpr_tools.errors import BadInputError, WorkFailedError, errors_for_scripts, os_error_as
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle

@@ -186,11 +186,7 @@ def limit_Nm(winch: Winch, tension_N: float, more_Nm: float) -> float:
 
 
 def measure_anchored(
-    session: Session,
-    out: Notifier,
-    path: Path,
-    plan: AnchorPlan,
-    cell: TensionExchange,
+    session: Session, out: Notifier, path: Path, plan: AnchorPlan, cell: TensionExchange
 ) -> Path:
     """Wind in to the highest tension and pay out again, recording readings into `path`.
 

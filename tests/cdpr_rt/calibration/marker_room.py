@@ -108,8 +108,7 @@ def room(
     seen = SeenMarkers.of(names, rows_seen, dict.fromkeys(range(count), size_m))
     k = list(seen.ids)
     truth = MarkerMap(
-        *(seen.ids, seen.ids[0], seen.size_m, middle[k], turn[k]),
-        *(seen.names, where, down),
+        *(seen.ids, seen.ids[0], seen.size_m, middle[k], turn[k]), *(seen.names, where, down)
     )
     return Room(truth, seen)
 

@@ -197,9 +197,7 @@ def test_cable_lengths_reveal_a_wrong_size_of_all_sheets() -> None:
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])
-def test_wrong_sizes_of_sheets_and_drums_are_distinguished(
-    drums: tuple[float, ...],
-) -> None:
+def test_wrong_sizes_of_sheets_and_drums_are_distinguished(drums: tuple[float, ...]) -> None:
     readings = Readings(_robot())
     readings.wrong_size(1.04)
     for cable, share in enumerate(drums):

@@ -12,21 +12,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.calibration.calibrate import calibrate
-from cdpr_rt.calibration.camera_model import (
-    CameraModel,
-    corner_residuals,
-    corner_terms,
-)
+from cdpr_rt.calibration.camera_model import CameraModel, corner_residuals, corner_terms
 from cdpr_rt.calibration.camera_start import camera_start, locate_by_camera, turned_camera
 from cdpr_rt.calibration.fit import fit, moved
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.parameters import Knowledge
 from cdpr_rt.calibration.readings import Images, Observations
-from cdpr_rt.calibration.verification import (
-    every_fifth,
-    relative_errors,
-    verifies,
-)
+from cdpr_rt.calibration.verification import every_fifth, relative_errors, verifies
 from cdpr_rt.errors import InvalidRequestError
 from tests.cdpr_rt.calibration.camera_robot import FEW, CameraRobot, camera_robot
 from tests.cdpr_rt.calibration.synthetic_readings import ErrorBudget, HAND_EYE_m

@@ -14,13 +14,7 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles.camera import KnownMarker, MarkerSheets, MarkerSize
 from cdpr_rt.calibration.camera_geometry import angles, project
 from cdpr_rt.calibration.marker_bundle import Estimate, adjust
-from cdpr_rt.calibration.marker_map import (
-    CORNERS,
-    SeenMarkers,
-    Sighting,
-    best_fit,
-    coverage,
-)
+from cdpr_rt.calibration.marker_map import CORNERS, SeenMarkers, Sighting, best_fit, coverage
 from cdpr_rt.calibration.marker_map_fit import (
     MapFit,
     Suspect,

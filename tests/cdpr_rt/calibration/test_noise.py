@@ -7,13 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_rt.calibration.fit import (
-    Fit,
-    balance,
-    fit,
-    fit_with_noise_seen,
-    weighed_fit,
-)
+from cdpr_rt.calibration.fit import Fit, balance, fit, fit_with_noise_seen, weighed_fit
 from cdpr_rt.calibration.parameters import DRUM
 from cdpr_rt.calibration.residuals import length_std_m
 from tests.cdpr_rt.calibration.camera_robot import KNOWN, CameraRobot, camera_robot
@@ -70,9 +64,7 @@ def test_balanced_tensions_hold_the_platform_and_have_smaller_errors() -> None:
 
 
 @pytest.mark.parametrize("std_N", [1.0, 20.0])  # friction of the motors at the cable
-def test_tensions_determined_by_weight_are_corrected_by_it(
-    std_N: float,
-) -> None:
+def test_tensions_determined_by_weight_are_corrected_by_it(std_N: float) -> None:
     what = made_up("suspended-6", 40, 5, noise_m=1e-4, in_balance=True)
     noise_N = np.random.default_rng(6).normal(0.0, std_N, what.seen.tension_N.shape)
     seen = measured(what, 1e-3, 2e-3, 4)

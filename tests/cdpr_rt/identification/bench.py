@@ -327,12 +327,7 @@ def validate(done: Commissioned) -> dict[str, ValidationMetrics]:
             judged = judged_turns(run.setpoint_rad, run.setpoint_velocity_rad_s, 0.6 * math.pi)
             runs.append(
                 evaluate(
-                    rec[:, 4],
-                    run.setpoint_rad,
-                    run.setpoint_velocity_rad_s,
-                    rec[:, 3],
-                    T,
-                    judged,
+                    rec[:, 4], run.setpoint_rad, run.setpoint_velocity_rad_s, rec[:, 3], T, judged
                 )
             )
         result[name] = worst(runs)

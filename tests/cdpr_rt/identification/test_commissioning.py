@@ -6,13 +6,7 @@ import pytest
 
 from cdpr_rt.control.validation import ratios
 from cdpr_rt.identification.harmonic_model import identify_harmonic_model
-from tests.cdpr_rt.identification.bench import (
-    Bench,
-    TruePlant,
-    commission,
-    compensation,
-    validate,
-)
+from tests.cdpr_rt.identification.bench import Bench, TruePlant, commission, compensation, validate
 
 pytestmark = pytest.mark.long
 

@@ -165,9 +165,7 @@ def test_a_calibration_that_predicts_held_out_poses_worse_is_never_adopted(
     assert calibrated(load_robot("spatial-8")).calibration is None
 
 
-def test_a_calibration_that_is_worse_only_by_noise_is_adopted_on_request(
-    tmp_path: Path,
-) -> None:
+def test_a_calibration_that_is_worse_only_by_noise_is_adopted_on_request(tmp_path: Path) -> None:
     asked = cdpr_here(*hardly_off(tmp_path, 2, 0.0), "--adopt")
     assert asked.returncode == 0, asked.stderr
     proof = result(asked)["verification"]

@@ -208,9 +208,7 @@ def test_a_silent_loop_does_not_count_as_rejection_of_a_place(measurement: Measu
     assert load_data(measurement.folder / "data.json").tried == ()
 
 
-def test_a_hold_by_another_client_ends_the_measurement_at_rest(
-    measurement: Measurement,
-) -> None:
+def test_a_hold_by_another_client_ends_the_measurement_at_rest(measurement: Measurement) -> None:
     def ask(pose: int) -> None:
         if pose == 3:
             measurement.daemon.program = "hold"

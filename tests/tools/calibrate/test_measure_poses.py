@@ -102,9 +102,7 @@ def stored(tmp_path: Path) -> Stored:
     return lambda: StoredPoses(tmp_path / next(names), no_poses(load_robot("planar-4"), True))
 
 
-def test_each_reading_is_saved_immediately_with_the_cameras_image(
-    stored: Stored,
-) -> None:
+def test_each_reading_is_saved_immediately_with_the_cameras_image(stored: Stored) -> None:
     operator = Operator()
     operator.marker = 4
     kept, counts = stored(), list[int]()
@@ -120,9 +118,7 @@ def test_each_reading_is_saved_immediately_with_the_cameras_image(
     assert last.image.sighting("x").corners_px[4].tolist() == [[0, 1], [2, 3], [4, 5], [6, 7]]
 
 
-def test_rejected_or_shaking_poses_are_skipped_with_a_reason(
-    stored: Stored,
-) -> None:
+def test_rejected_or_shaking_poses_are_skipped_with_a_reason(stored: Stored) -> None:
     operator, notes = Operator(shaky=3.0, refused=2.0), Notes()
     kept = stored()
     measure_poses(operator, PLACES[:6], BETWEEN, kept, notes)
@@ -143,9 +139,7 @@ def test_a_rejected_straight_way_is_replaced_by_a_detour(stored: Stored) -> None
     assert operator.gone == [1.0, 2.0, 0.5, 3.0, 4.0]
 
 
-def test_a_platform_stopped_on_its_detour_is_measured_where_it_stands(
-    stored: Stored,
-) -> None:
+def test_a_platform_stopped_on_its_detour_is_measured_where_it_stands(stored: Stored) -> None:
     operator, notes = Operator(behind=3.0, held_on_way_to=0.5), Notes()
     kept = stored()
     measure_poses(operator, PLACES[:4], BETWEEN, kept, notes)
@@ -212,9 +206,7 @@ def test_at_most_five_consecutive_unreached_poses_are_measured_where_they_stand(
     assert [reading.target[0] for reading in kept.data.poses] == [3, 4, 4, 4, 4, 4, 4]
 
 
-def test_an_unreached_moving_pose_is_skipped_with_both_reasons(
-    stored: Stored,
-) -> None:
+def test_an_unreached_moving_pose_is_skipped_with_both_reasons(stored: Stored) -> None:
     kept, notes = stored(), Notes()
     measure_poses(Operator(beyond=8.0, shaky=8.0), PLACES[8:9], BETWEEN, kept, notes)
     assert not kept.data.poses and kept.data.tried == ((9.0, 2.0),)

@@ -52,12 +52,7 @@ def test_a_number_gives_the_number_of_poses() -> None:
         (2, 5, "0.5", r"poses\.csv:3: .*: turned by .* deg; allowed: up to 15\.0 deg"),
         (2, 1, "much", r"poses\.csv:3: y: value 'much' is not a number"),
         (2, 5, None, r"poses\.csv:3: 5 cells; allowed: 6"),
-        (
-            0,
-            5,
-            None,
-            r"poses\.csv:1: column rz is missing; allowed: x, .*, rz, each with",
-        ),
+        (0, 5, None, r"poses\.csv:1: column rz is missing; allowed: x, .*, rz, each with"),
         (0, 0, "q_m", r"poses\.csv:1: .*'q_m'"),
         (2, 1, "1" * 200_000, r"poses\.csv:3: field larger than"),
     ],

@@ -157,9 +157,7 @@ def test_a_drive_fault_during_the_motion_marks_the_pose_as_tried(
     assert measured.data.tried == (tuple(places.chosen[0].tolist()),)
 
 
-def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried(
-    tmp_path: Path,
-) -> None:
+def test_a_drive_fault_before_the_motion_does_not_mark_the_pose_as_tried(tmp_path: Path) -> None:
     places = chosen_places(load_robot("planar-3"), 3, 3)
     with simulated_rig("planar-3", plant=None, scanner=False) as operator:
         operator.tighten()
