@@ -111,7 +111,7 @@ def checked(
             str(robot.path),
             plant=plant,
             scanner=scanner,
-            camera=None if known is None else partial(kept.camera, out),
+            images=None if known is None else partial(kept.images, out),
             stop=stop,
             as_calibrated=True,
         ) as operator,

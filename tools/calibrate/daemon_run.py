@@ -7,7 +7,7 @@ import os
 import select
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -123,8 +123,8 @@ def image_taker(
         yield lambda _wait: None
         return
     kept.change(camera=_camera_setup(kept.data, intrinsics, markers))
-    with closing(kept.camera(out, camera, PacedClock())) as opened:
-        yield lambda wait: opened.see(len(kept.data.poses) + 1, wait)
+    with kept.images(out, camera, PacedClock()) as image:
+        yield image
 
 
 def _camera_setup(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from pydantic import Field
@@ -20,6 +20,7 @@ from cdpr_profiles.robot_limits import Limit
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.calibration.readings import CalibrationData, ImageReading, PoseReading
+from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.states import EMERGENCY_STOP
 from cdpr_rt.errors import TripError
 from cdpr_rt.robot import Error, Faulted, MotionEnded, Refused, Robot, end_text
@@ -28,10 +29,6 @@ from cdpr_tools.client.daemon_robot import command_error
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.trials.directions import Directions, platform_of
-
-if TYPE_CHECKING:
-    from cdpr_rt.core.clock import Clock
-    from cdpr_tools.calibrate.pose_camera import PoseCamera
 
 READING_S, SETTLE_S = 0.5, 1.0
 """Averaging time of a reading, and settling time before it."""
@@ -362,15 +359,21 @@ class StoredPoses:
         """Replace values of the data."""
         self.data = self.data.model_copy(update=update)
 
-    def camera(self, out: Output, url: str, clock: Clock) -> PoseCamera:
-        """Open the camera of a URL for the images of further poses; raises CameraError."""
+    @contextmanager
+    def images(self, out: Output, url: str, clock: Clock) -> Iterator[TakeImage]:
+        """Yield a function that takes the image of the next pose with the camera of a URL.
+
+        Raises CameraError.
+        """
         from cdpr_tools.calibrate.pose_camera import (  # noqa: PLC0415  # needs an extra
             PoseCamera,
         )
 
-        setup, images = self.data.camera, self.folder / IMAGES
+        setup, folder = self.data.camera, self.folder / IMAGES
         assert setup is not None  # only used if there is a camera
-        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
+        opened = PoseCamera(url, clock, setup.intrinsics, setup.sheets, folder, out.note)
+        with closing(opened):
+            yield lambda wait: opened.see(len(self.data.poses) + 1, wait)
 
     def save(self) -> None:
         """Write the data; raises ProfileError."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -18,17 +18,12 @@ from typing_extensions import override
 from cdpr_profiles.geometry_calibration import write_text
 from cdpr_profiles.reader import Profile, read_json_model
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.marker_map import Sighting
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.robot import Error, Robot
-from cdpr_tools.calibrate.measure_poses import PoseOperator, Readings, TargetNotReached
+from cdpr_tools.calibrate.measure_poses import PoseOperator, Readings, TakeImage, TargetNotReached
 from cdpr_tools.client.daemon_robot import robot_errors
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.truth import SCANNER, RecordLog
-
-if TYPE_CHECKING:
-    from cdpr_tools.calibrate.pose_camera import PoseCamera
-
 
 # True and scanned poses of a simulated robot. They only verify a calibration; its fit does not use
 # them.
@@ -77,23 +72,18 @@ class RigOperator(PoseOperator):
     """
 
     def __init__(
-        self, rig: LockstepRobot, scanner: RecordLog, given: bool, stop: Callable[[], bool]
+        self,
+        rig: LockstepRobot,
+        scanner: RecordLog,
+        given: bool,
+        image: TakeImage,
+        stop: Callable[[], bool],
     ) -> None:
-        super().__init__(Robot(rig), rig.robot, self._see, stop)
+        super().__init__(Robot(rig), rig.robot, image, stop)
         self.rig = rig
-        self.camera: PoseCamera | None = None
-        self.number = 1
-        """Number of the pose that is read next."""
         self._scanner, self._given = scanner, given
         self._standing: int | None = None
         """Number of scanner readings when the platform came to rest; None while it moves."""
-
-    def _see(self, wait: Callable[[float], None]) -> Sighting | None:
-        if self.camera is None:
-            return None
-        seen = self.camera.see(self.number, wait)
-        self.number += 1
-        return seen
 
     @override
     def move_to(self, place: FloatArray) -> TargetNotReached | None:
@@ -152,14 +142,14 @@ def simulated_rig(
     *,
     plant: Path | None,
     scanner: bool,
-    camera: Callable[[str, Clock], PoseCamera] | None = None,
+    images: Callable[[str, Clock], AbstractContextManager[TakeImage]] | None = None,
     stop: Callable[[], bool] = lambda: False,
     as_calibrated: bool = False,
 ) -> Iterator[RigOperator]:
     """Open a robot on its own simulator; raises CommandError, DriverError and ProfileError.
 
-    With `scanner`, readings contain the scanner's pose; `camera` opens the camera of a URL. The
-    robot is shut down under control however the block ends, unless it no longer responds.
+    With `scanner`, readings contain the scanner's pose; `images` takes images with the camera of a
+    URL. The robot is shut down under control however the block ends, unless it no longer responds.
     """
     with TemporaryDirectory(prefix="cdpr-calibrate-") as folder:
         path, socket = Path(folder) / "scanner.log", Path(folder) / "camera"
@@ -169,23 +159,25 @@ def simulated_rig(
                 robot,
                 plant=plant,
                 scanner=path,
-                camera=None if camera is None else socket,
+                camera=None if images is None else socket,
                 as_calibrated=as_calibrated,
                 calibration_in_doubt=True,
             ) as rig,
             RecordLog(path, SCANNER) as log,
         ):
-            operator = RigOperator(rig, log, scanner, stop)
+            camera: AbstractContextManager[TakeImage] = nullcontext(_no_image)
+            if images is not None:
+                camera = images(f"sim:{socket}", rig.machine.clock)
             try:
-                if camera is not None:
-                    operator.camera = camera(f"sim:{socket}", rig.machine.clock)
-                yield operator
+                with camera as image:
+                    yield RigOperator(rig, log, scanner, image, stop)
             except Exception:
                 with suppress(Error):  # the first error shows the cause
                     rig.shut_down()
                 raise
             else:
                 rig.shut_down()
-            finally:
-                if operator.camera is not None:
-                    operator.camera.close()
+
+
+def _no_image(_wait: Callable[[float], None]) -> None:
+    """Take no image, because there is no camera."""

@@ -233,7 +233,7 @@ def measure(
                     str(robot.path),
                     plant=plant,
                     scanner=settings.source == "scanner",
-                    camera=partial(kept.camera, out) if settings.source == "camera" else None,
+                    images=partial(kept.images, out) if settings.source == "camera" else None,
                     stop=stop,
                 )
             )
@@ -241,7 +241,6 @@ def measure(
         count = len(kept.data.poses)
         if count:
             out.note(f"continuing after {count} poses; reading home again first")
-        operator.number = count + 1
         read_places(
             *(out, robot, operator, kept, places, most, criterion),
             home=home,

@@ -54,7 +54,6 @@ class Rig(RigOperator):
 
     def __init__(self, fails_at: int, failure: BaseException | None) -> None:
         self.geometry = CableGeometry.of(ROBOT)
-        self.number = 0
         self.offset = 0.004 * Rig.started
         Rig.started += 1
         self.here = self.geometry.model.home.copy()
