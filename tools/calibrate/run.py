@@ -277,7 +277,8 @@ def compared_with_truth(outcome: Outcome, folder: Path) -> TruthComparison | Non
         return None
     plant = CalibrationRunSettings.load(folder).plant
     outside = OutsidePoses.load_file(folder / OUTSIDE)
-    return compare_with_truth(outcome.robot, plant and Path(plant), outcome, outside)
+    file = None if plant is None else Path(plant)
+    return compare_with_truth(outcome.robot, file, outcome, outside)
 
 
 @contextmanager

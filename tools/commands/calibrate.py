@@ -380,6 +380,7 @@ def run(
             stop_criterion,
             with_hand_eye,
         )
+        from cdpr_tools.calibrate.measure_poses import DATA  # noqa: PLC0415
         from cdpr_tools.calibrate.places import poses_wanted  # noqa: PLC0415
         from cdpr_tools.calibrate.run import check_points, source_of  # noqa: PLC0415
 
@@ -403,7 +404,7 @@ def run(
             check_points(points, profile, None)
         kept = runs.StoredRun.resumed(folder, profile)
     else:
-        _require_new(folder, runs.DATA, overwrite)
+        _require_new(folder, DATA, overwrite)
         source = source_of(
             profile, camera=camera, redundancy=redundancy, scanner=scanner, points=bool(points)
         )
@@ -430,7 +431,7 @@ def run(
         out, profile, settings, kept, stop_criterion(out, profile, points, geometry)
     )
     result = concluded(
-        *(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, adopt)
+        *(out, profile, data, points, geometry, folder / DATA, folder, dry_run, adopt)
     )
     finish(out, result)
 
