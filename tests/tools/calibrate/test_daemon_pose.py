@@ -19,6 +19,7 @@ from cdpr_tools.calibrate import daemon_run, pose_camera, run
 from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses, TakeImage
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.usefixtures("daemon_time")
 
@@ -186,7 +187,7 @@ def test_each_pose_has_an_image_and_the_first_also_the_camera_files(
     def look(where: Path, *files: Path | None) -> None:
         robot, kept = kept_in(told, where)
         with (
-            daemon_run.image_taker("opencv:0", *files, kept, print) as image,
+            daemon_run.image_taker("opencv:0", *files, kept, Output(as_json=False)) as image,
             commanded(told) as running,  # type: ignore[arg-type]
         ):
             daemon_run.read_into(PoseOperator(running, robot, image), robot, kept)
