@@ -18,6 +18,7 @@ from unittest import mock
 import can
 import canopen
 import pytest
+from cdpr_here import cdpr_here
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import ProfileError, load_drive
@@ -37,10 +38,10 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def simulator(*options: str | Path) -> Iterator[str]:
+def simulator(*options: str | Path, winch: str | Path = WINCH) -> Iterator[str]:
     """Run drives on a bus. Yield its name."""
     name = f"lss-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    words = ["sim", "up", WINCH, "--bus", f"simbus:{name}", "--exit-with-stdin"]
+    words = ["sim", "up", str(winch), "--bus", f"simbus:{name}", "--exit-with-stdin"]
     command = [sys.executable, "-m", "cdpr_tools.cli", *words, *map(str, options)]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -143,27 +144,13 @@ def test_a_single_drive_gets_a_stored_bit_rate(tmp_path: Path) -> None:
     text = (Path(__file__).parents[3] / "profiles" / "winches" / f"{WINCH}.toml").read_text()
     assert "bitrate_bit_s = 1000000" in text
     winch.write_text(text.replace("bitrate_bit_s = 1000000", "bitrate_bit_s = 500000"))
-    name = f"lss-slow-{os.getpid()}"
-    words = ["sim", "up", str(winch), "--bus", f"simbus:{name}", "--exit-with-stdin"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cdpr_tools.cli", *words, "--store", str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    try:
-        assert process.stdout is not None
-        assert b"ready" in process.stdout.readline()
+    with simulator(*store, winch=winch) as name:
         assert answers(name, 1)
-    finally:
-        process.communicate(timeout=120)
 
 
 def test_a_damaged_store_is_reported(tmp_path: Path) -> None:
     (tmp_path / "drive-1.json").write_text("{")
-    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", WINCH, "--bus", "simbus:never"]
-    ended = subprocess.run(
-        [*command, "--store", str(tmp_path)], capture_output=True, text=True, check=False
-    )
+    ended = cdpr_here("sim", "up", WINCH, "--bus", "simbus:never", "--store", tmp_path)
     assert ended.returncode == 2
     assert "drive-1.json: is not valid JSON" in ended.stderr
 

@@ -126,7 +126,7 @@ def loop() -> None:
             block.write_status({"state": "unconfigured", "reason": CUT_SHORT})
             break
     _note(folder, "loop stopped")
-    if "unconfirmed" in plan:
+    if plan.get("unconfirmed"):
         block.write_status({"state": "unconfigured", "reason": plan["unconfirmed"]})
         sys.exit(POWER_UNCONFIRMED)
 

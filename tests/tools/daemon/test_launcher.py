@@ -153,17 +153,6 @@ def _gone(pid: int) -> bool:
     return not _is_child(pid)
 
 
-def test_the_launcher_reports_readiness_and_ends_the_loop_before_the_service(start: Start) -> None:
-    daemon = start({"stopping_s": 0.5})
-    assert daemon.line("ready")["ready"]["state"] == "ready"
-    daemon.heard("READY=1")
-    daemon.process.terminate()
-    daemon.heard("STOPPING=1")
-    assert daemon.ends() == 0
-    # the recording contains the whole controlled stop
-    assert daemon.log() == ["loop stopped", "service stopped"]
-
-
 def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> None:
     daemon = start({"stopping_s": 1.0, "loading_s": 0.5}, watchdog_s=0.4)
     daemon.stuff()  # before the first notification
@@ -173,6 +162,8 @@ def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> 
     told = daemon.heard("STATUS=fault: left: too fast")
     assert told.count("READY=1") == 1
     assert "STATUS=ready" not in told  # only the newest state is sent
+    os.kill(daemon.pid("service"), signal.SIGKILL)
+    assert "killed by signal 9" in daemon.line("told")["told"]  # without repeating the fault
     daemon.feeds()
     daemon.stuff()
     daemon.process.terminate()
@@ -235,27 +226,7 @@ def test_a_dead_loop_is_reported_and_the_service_remains(start: Start) -> None:
     assert daemon.ends() == 1
 
 
-def test_a_loop_that_ends_with_unconfirmed_power_is_not_reported_as_dead(
-    start: Start,
-) -> None:
-    why = "node 1: does not confirm that its power stage is off"
-    daemon = start({"unconfirmed": why})
-    daemon.line("ready")
-    (daemon.folder / "shutdown").touch()
-    assert daemon.line("reason")["reason"] == why
-    assert daemon.ends() == 1
-
-
-def test_a_fault_is_reported_with_its_reason_once(start: Start) -> None:
-    daemon = start()
-    daemon.line("ready")
-    (daemon.folder / "fault").touch()
-    assert daemon.line("told")["told"] == "fault: left: too fast"
-    os.kill(daemon.pid("service"), signal.SIGKILL)
-    assert "killed by signal 9" in daemon.line("told")["told"]  # without repeating the fault
-
-
-def test_the_watchdog_is_fed_only_while_the_loop_turns(start: Start) -> None:
+def test_a_hanging_loop_does_not_feed_the_watchdog_and_is_killed_at_the_end(start: Start) -> None:
     daemon = start({"stalled_s": 1.0}, watchdog_s=0.4)
     daemon.line("ready")
     daemon.feeds()
@@ -266,6 +237,12 @@ def test_the_watchdog_is_fed_only_while_the_loop_turns(start: Start) -> None:
     os.kill(loop, signal.SIGCONT)
     assert "runs again" in daemon.line("told")["told"]
     daemon.feeds()
+    os.kill(loop, signal.SIGSTOP)
+    assert "has run no cycle" in daemon.line("told")["told"]
+    daemon.process.terminate()
+    assert "was killed" in daemon.line("reason")["reason"]
+    assert daemon.ends() == 1
+    assert daemon.log() == ["service stopped"]
 
 
 def test_a_stalled_loop_in_lockstep_is_not_reported(start: Start) -> None:
@@ -279,17 +256,6 @@ def test_a_stalled_loop_in_lockstep_is_not_reported(start: Start) -> None:
     daemon.feeds()
     (daemon.folder / "fault").touch()
     assert daemon.line("told")["told"] == "fault: left: too fast", "no earlier notice"
-
-
-def test_a_hanging_loop_is_killed_when_the_daemon_ends(start: Start) -> None:
-    daemon = start({"stalled_s": 1.0})
-    daemon.line("ready")
-    os.kill(daemon.pid("loop"), signal.SIGSTOP)
-    assert "has run no cycle" in daemon.line("told")["told"]
-    daemon.process.terminate()
-    assert "was killed" in daemon.line("reason")["reason"]
-    assert daemon.ends() == 1
-    assert daemon.log() == ["service stopped"]
 
 
 def test_a_loop_that_turns_again_gets_its_time_to_end(start: Start) -> None:
@@ -377,9 +343,10 @@ def test_the_robot_is_locked_until_the_loop_of_a_killed_launcher_has_ended(start
     raise AssertionError("the robot stays locked")
 
 
-def test_a_private_file_beside_the_socket_names_the_running_loop(start: Start) -> None:
-    daemon = start()
-    daemon.line("ready")
+def test_a_private_file_names_the_running_loop_which_ends_before_the_service(start: Start) -> None:
+    daemon = start({"stopping_s": 0.5})
+    assert daemon.line("ready")["ready"]["state"] == "ready"
+    daemon.heard("READY=1")
     path = daemon.folder / "control.loop"
     named = LoopFile.read(path)
     assert (named.pid, named.drives_stop_s) == (daemon.pid("loop"), 0.2)
@@ -391,6 +358,8 @@ def test_a_private_file_beside_the_socket_names_the_running_loop(start: Start) -
     assert named.model_copy(update={"started": named.started + 1}).open() is None
     daemon.process.terminate()
     assert daemon.ends() == 0
+    # the recording contains the whole controlled stop
+    assert daemon.log() == ["loop stopped", "service stopped"]
     assert named.open() is None
     assert not path.exists()
 
@@ -452,12 +421,15 @@ def test_a_service_that_cannot_start_ends_the_daemon_after_retries(
     assert daemon.log().count("service refused") == times
 
 
-def test_a_loop_that_was_shut_down_ends_the_daemon_with_status_0(start: Start) -> None:
-    daemon = start()
+@pytest.mark.parametrize("why", ["", "node 1: does not confirm that its power stage is off"])
+def test_a_loop_that_was_shut_down_ends_the_daemon_without_reporting_it_dead(
+    start: Start, why: str
+) -> None:
+    daemon = start({"unconfirmed": why})
     daemon.line("ready")
     (daemon.folder / "shutdown").touch()
-    assert daemon.line("reason")["reason"] == ""
-    assert daemon.ends() == 0
+    assert daemon.line("reason")["reason"] == why
+    assert daemon.ends() == bool(why)
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 

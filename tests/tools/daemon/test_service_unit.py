@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from cdpr_here import cdpr_here
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,13 +24,6 @@ from cdpr_tools.daemon.settings import Address, RunSettings, is_loopback, read_k
 from cdpr_tools.errors import BadInputError
 
 
-def cdpr(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd
-    )
-
-
 def _value(unit: str, key: str) -> str:
     return next(line for line in unit.splitlines() if line.startswith(f"{key}=")).partition("=")[2]
 
@@ -39,7 +33,7 @@ def test_the_unit_starts_the_requested_daemon_with_absolute_paths(tmp_path: Path
     key.write_text("0123456789abcdef0123456789abcdef\n")
     key.chmod(0o600)
     asked = ("--http", "0.0.0.0:8000", "--key-file", "key file", "--live", "0", "--read-only")
-    made = cdpr("service-unit", "spatial-8", "--user", "robot", *asked, cwd=tmp_path)
+    made = cdpr_here("service-unit", "spatial-8", "--user", "robot", *asked, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     words = shlex.split(_value(made.stdout, "ExecStart"))
     assert words[1:4] == ["run", "spatial-8", "--yes"]
@@ -94,7 +88,7 @@ def test_systemd_reports_no_problem_with_the_unit(tmp_path: Path) -> None:
     ],
 )
 def test_a_unit_for_an_invalid_run_is_rejected(options: tuple[str, ...], words: str) -> None:
-    made = cdpr("service-unit", "spatial-8", *options)
+    made = cdpr_here("service-unit", "spatial-8", *options)
     assert made.returncode == 2
     assert made.stdout == ""
     assert words in made.stderr

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cdpr_here import cdpr_here
 
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
@@ -105,13 +104,9 @@ def test_an_experiment_is_resumed_and_evaluated_from_its_files(
         experiment.begin(replace(SETTINGS, seed=2), folder)
 
 
-def cdpr(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "cdpr_tools.cli", "teleop", "experiment", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-
-
 def test_the_operator_alone_gives_one_line_of_json() -> None:
-    done = cdpr("--perfect-robot", "--places", "A", "--scales", "2:1", "--repeats", 1, "--json")
+    few = ("--places", "A", "--scales", "2:1", "--repeats", "1")
+    done = cdpr_here("teleop", "experiment", "--perfect-robot", *few, "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])
     assert [row["level"] for row in told["rows"]] == ["0 ms", "350 ms", "730 ms", "2:1", "A"]
@@ -135,12 +130,7 @@ def test_the_operator_alone_gives_one_line_of_json() -> None:
 def test_invalid_input_prints_one_message(
     arguments: list[str], message: str, tmp_path: Path
 ) -> None:
-    from typer.testing import CliRunner  # noqa: PLC0415
-
-    from cdpr_tools.commands.teleop import app  # noqa: PLC0415
-
     where = [] if "--out" in arguments or "--again" in arguments else ["--out", str(tmp_path / "x")]
-    result = CliRunner().invoke(app, ["experiment", *arguments, *where])
-    assert message in str(result.exception)
-    assert getattr(result.exception, "exit_status", None) == 2
+    result = cdpr_here("teleop", "experiment", *arguments, *where)
+    assert (result.returncode, message in result.stderr) == (2, True), result.stderr
     assert not (tmp_path / "x").exists()
