@@ -825,7 +825,7 @@ def _finite(value: float) -> float:
 
 
 def _plain(name: str, value: Any) -> Any:
-    """Return an argument of a command as JSON has it; raises InvalidArgument."""
+    """Return an argument of a command as plain JSON values; raises InvalidArgument."""
     try:
         return json.loads(json.dumps(value, allow_nan=False, default=lambda array: array.tolist()))
     except (AttributeError, RecursionError, TypeError, ValueError):

@@ -39,7 +39,7 @@ class CameraKnowledge:
     size_std: float
     """Relative standard deviation of the size that all sheets share."""
     lens: FloatArray
-    """(9,)"""
+    """Prior values of the lens parameters, (9,)."""
     lens_std: FloatArray
     """Standard deviations of the lens parameters, (9,); 0 for fixed ones."""
     known: BoolArray

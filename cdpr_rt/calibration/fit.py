@@ -189,7 +189,7 @@ class Fit:
     jumps_m: FloatArray
     """Sizes of the jumps of lengths, in the order of the observations' jumps."""
     poses: FloatArray
-    """(N, 4, 3)"""
+    """The fitted pose of each reading, (N, 4, 3)."""
     seen: Observations
     covariance: FloatArray
     """Covariance of the parameters of geometry, jumps and camera, (P, P), with priors, due to noise

@@ -42,7 +42,7 @@ class CornerTerms:
     by_shared: FloatArray
     """Derivatives by parameters that all images share, such as the lens, (n, 8, C)."""
     by_marker: FloatArray
-    """(n, 8, 6)"""
+    """Derivatives by the pose of the marker, (n, 8, 6)."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,11 @@ class PoseBlocks:
     """Normal equations of P parameters and N poses of d directions."""
 
     H: FloatArray
-    """(P, P)"""
+    """Block of the parameters, (P, P)."""
     E: FloatArray
-    """(N, P, d)"""
+    """Blocks that couple the parameters and each pose, (N, P, d)."""
     C: FloatArray
-    """(N, d, d)"""
+    """Block of each pose, (N, d, d)."""
     by_parameter: FloatArray
     """Gradients, (P,) and (N, d)."""
     by_pose: FloatArray

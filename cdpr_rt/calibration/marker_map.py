@@ -101,7 +101,7 @@ class MarkerMap:
     ids: tuple[int, ...]
     reference: int
     size_m: FloatArray
-    """(m,)."""
+    """Sizes of the markers' black squares, (m,)."""
     position_m: FloatArray
     """Positions of the markers' centres, (m, 3)."""
     rotation: FloatArray
@@ -109,7 +109,7 @@ class MarkerMap:
     names: tuple[str, ...]
     """Names of the images."""
     camera_position_m: FloatArray
-    """(k, 3)."""
+    """Positions of the camera, (k, 3)."""
     camera_rotation: FloatArray
     """Rotations from the camera's frame to the map's, (k, 3, 3)."""
 

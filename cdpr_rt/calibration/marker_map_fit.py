@@ -281,7 +281,7 @@ class SquarePoses:
     """Two poses of each of n squares in the camera's frame, the better one first."""
 
     rotation: FloatArray
-    """(n, 2, 3, 3)."""
+    """Rotations from the squares' frames to the camera's, (n, 2, 3, 3)."""
     position_m: FloatArray
     """Positions of their centres, (n, 2, 3)."""
     error_px: FloatArray

@@ -97,9 +97,9 @@ class Points:
 
     pose: IntArray
     place_m: FloatArray
-    """(M, k)"""
+    """Measured coordinates, (M, k)."""
     std_m: FloatArray
-    """(M, k)"""
+    """Standard deviations of these, (M, k)."""
 
     @classmethod
     def of(cls, seen: Observations, coordinates: int) -> Points:
@@ -138,9 +138,9 @@ class _Score:
     costs: tuple[float, ...]
     """The cost for each of `_NOISIER`."""
     y: FloatArray
-    """(M k,)"""
+    """Differences of the points from the positions by lengths, (M k,)."""
     A: FloatArray
-    """(M k, P)"""
+    """Derivatives of these by the parameters, (M k, P)."""
     W: tuple[FloatArray, ...]
     """S^-1 for each of `_NOISIER`; 0 for coordinates that are unknown or contradict all others."""
     free: FloatArray

@@ -164,7 +164,7 @@ class Observations:
     position_m: FloatArray
     """Measured positions in the room, (N, 3)."""
     position_std_m: FloatArray
-    """(N, 3)"""
+    """Standard deviations of these positions, (N, 3)."""
     rotation: FloatArray
     """Measured rotations, (N, 3, 3)."""
     rotation_std_rad: FloatArray

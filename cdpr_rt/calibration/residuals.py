@@ -67,11 +67,11 @@ class Linearised:
     """
 
     residual: FloatArray
-    """(N, R)"""
+    """Residuals, (N, R)."""
     by_parameter: FloatArray
-    """(N, R, P)"""
+    """Derivatives by the P parameters, (N, R, P)."""
     by_pose: FloatArray
-    """(N, R, d)"""
+    """Derivatives by the pose of the row, (N, R, d)."""
 
     @property
     def points(self) -> slice:

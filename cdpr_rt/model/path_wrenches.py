@@ -116,9 +116,9 @@ class AvailableWrenches:
     """
 
     normals: FloatArray
-    """(m, f, d)"""
+    """Normals of the f facets at each pose, (m, f, d)."""
     lower: FloatArray
-    """(m, f)"""
+    """Lower bounds, (m, f)."""
     upper: FloatArray
 
     @property

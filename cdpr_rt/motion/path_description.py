@@ -92,7 +92,7 @@ class PathDescription:
     source: str
     coordinates: Coordinates
     start: FloatArray
-    """(d,)"""
+    """The first position, (d,)."""
     start_line: int
     moves: list[Move] = field(default_factory=list)
     notices: list[str] = field(default_factory=list)

@@ -42,14 +42,14 @@ class Pieces:
     """
 
     start: FloatArray
-    """(m, d)"""
+    """Position at which each piece begins, (m, d)."""
     way: FloatArray
     arm: FloatArray
     """From the axis of the arc to its start, (m, 3)."""
     normal: FloatArray
     """Direction of the axis, (m, 3)."""
     angle_rad: FloatArray
-    """(m,)"""
+    """Angle of an arc, 0 for a line, (m,)."""
     length: FloatArray
     speed: FloatArray
     """Largest wanted speed, m/s, or rad/s for pieces that only turn."""
@@ -230,7 +230,7 @@ class PathNodes:
     s: FloatArray
     """Length along the path, (N,); the end of a run and the start of the next have the same."""
     q: FloatArray
-    """(N, d)"""
+    """Positions, (N, d)."""
     first: FloatArray
     """First derivative by length."""
     second: FloatArray
@@ -254,8 +254,7 @@ class PathNodes:
         return float(np.linalg.norm(np.diff(self.q[:, :k], axis=0), axis=1).sum())
 
     def between(self, share: float, begin: int = 0, end: int | None = None) -> FloatArray:
-        """Return the path at a share of each interval, for intervals after the nodes begin to end -
-        1.
+        """Return positions at a share of the intervals that follow nodes `begin` to `end` - 1.
 
         Nodes that end a run return their own position.
         """

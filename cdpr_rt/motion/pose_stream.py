@@ -69,12 +69,12 @@ class Buffer(NamedTuple):
     """State of the buffer: the row played last, and the waiting samples in order."""
 
     played: FloatArray
-    """(COLUMNS,)"""
+    """The row played last, (COLUMNS,)."""
     times: FloatArray
     """Times of sending, (QUEUE_LENGTH,)."""
     sequences: IntArray
     rows: FloatArray
-    """(QUEUE_LENGTH, COLUMNS)"""
+    """The waiting samples, (QUEUE_LENGTH, COLUMNS)."""
     scalars: FloatArray
     counts: IntArray
 

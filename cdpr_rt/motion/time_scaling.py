@@ -80,14 +80,15 @@ class WrenchBounds(NamedTuple):
     row: IntArray
     """Row of `normals`, `lower` and `upper` for each node, (N,)."""
     normals: FloatArray
-    """(t, f, d)"""
+    """Normals of the f half-spaces at t places, (t, f, d)."""
     lower: FloatArray
-    """(t, f), below 0, and `upper` above 0: the wrench at rest has been subtracted."""
+    """Lower bounds (t, f). They are below 0, and `upper` is above 0, because the wrench at rest has
+    been subtracted."""
     upper: FloatArray
     by_u: FloatArray
-    """(N, d), the factor of d²s/dt², and ..."""
+    """Wrench per u = d²s/dt² at each node, (N, d)."""
     by_x: FloatArray
-    """... (ds/dt)²."""
+    """Wrench per x = (ds/dt)² at each node, (N, d)."""
 
     @classmethod
     def none(cls, count: int, d: int) -> WrenchBounds:

@@ -201,7 +201,7 @@ def _stop_with_stdin(loop: Loop) -> None:
     try:
         loop.watch(descriptor, read)
     except PermissionError:
-        raise BusSetupError("standard input must be a pipe to be watched for its end") from None
+        raise BusSetupError("--exit-with-stdin: standard input must be a pipe") from None
 
 
 _SHOWN_KEYS = ("robot", "bus", "mode", "nodes", "slcan", "socketcand", "truth_log")

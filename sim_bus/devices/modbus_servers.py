@@ -163,7 +163,7 @@ def _end_event(
         loop.add_reader(descriptor, read)
     except PermissionError:
         if until_stdin_ends:
-            raise BusSetupError("standard input must be a pipe to be watched for its end") from None
+            raise BusSetupError("--exit-with-stdin: standard input must be a pipe") from None
     return ended
 
 

@@ -257,7 +257,7 @@ def _goals(daemon: Daemon, axes: list[str], cable: bool) -> list[float]:
     if "pid" not in daemon.get("/description").get("programs", ["pid"]):
         raise BadInputError(
             f"{' '.join(axes)}: this robot moves its platform: `cdpr move --to` with its position "
-            "in mm; `cdpr jog` turns a winch"
+            "in mm, or with the name of a pose; `cdpr jog` turns a winch"
         )
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
     factor = 1e-3 if cable else math.radians(1.0)

@@ -44,7 +44,7 @@ class PoseTable:
     quaternion: FloatArray | None
     """Measured rotations, w x y z, (m, 4)."""
     time_s: FloatArray | None
-    """(m, 1)"""
+    """Times of the rows, (m, 1)."""
 
 
 def read_pose_table(path: Path, n: int) -> PoseTable:

@@ -132,10 +132,10 @@ class View:
             return Text(f"waiting for the robot to follow: {state}", style="yellow")
         if session.silent_s > _SILENT_S:
             return Text(f"NO ANSWER for {session.silent_s:.1f} s", style="bold red")
-        leads = "HOLDS" if hand.clutch or hand.trouble else "LEADS"
+        word = "ROBOT HOLDS" if hand.clutch or hand.trouble else "ROBOT FOLLOWS"
         count = f", {hand.confirmed} confirmed" if hand.confirmed else ""
         return Text.assemble(
-            (leads, "bold yellow" if leads == "HOLDS" else "bold green"), f"  {state}{count}"
+            (word, "bold yellow" if word == "ROBOT HOLDS" else "bold green"), f"  {state}{count}"
         )
 
     def _link(self) -> str:

@@ -28,14 +28,14 @@ class Directions:
     names: tuple[str, ...]
     """A name for each direction, positions first."""
     home_rotation: FloatArray
-    """(3, 3)"""
+    """Rotation matrix at home, (3, 3)."""
     low_m: FloatArray
-    """(k,)"""
+    """Lower bounds of the coordinates, (k,)."""
     high_m: FloatArray
     angle_rad: float
     """The largest angle from the orientation at home."""
     speed: FloatArray
-    """(d,)"""
+    """The highest speed in each direction, (d,)."""
     acceleration: FloatArray
 
     @classmethod

@@ -96,7 +96,7 @@ class PathErrors:
 
     time_s: FloatArray
     true_m: FloatArray
-    """(c, k)"""
+    """True positions, (c, k)."""
     described_m: FloatArray
     """Points of the file's path, corners not cut, 0.5 mm apart."""
     off_mm: FloatArray

@@ -77,7 +77,7 @@ def test_the_picture_shows_robot_and_target_at_their_positions() -> None:
     # 1 m of 4.2 m in 22 rows of 4 dots, with 2 dots per character
     assert column_o - column_t == pytest.approx(1.0 * 22 * 4 / 4.2 / 2, abs=1.5)
     for told in (
-        "LEADS  active, 2 confirmed",
+        "ROBOT FOLLOWS  active, 2 confirmed",
         "platform +500.0 +500.0 mm, +3.00 deg; target -500.0 +500.0 mm",
         "hand +10.0 +0.0 mm times 8; round trip 730.0 ms (at most 730.0 in 2 s)",
         "left 40, right -, lower 20",
@@ -116,7 +116,7 @@ def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
 
 def test_a_robot_without_picture_shows_figures_only() -> None:
     lines = seen(UNKNOWN_POSE, {}, platform=None)
-    assert lines[0].startswith("LEADS")
+    assert lines[0].startswith("ROBOT FOLLOWS")
     assert not any("platform" in line or "◉" in line for line in lines)
 
 
