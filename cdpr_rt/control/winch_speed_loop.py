@@ -29,10 +29,10 @@ platform."""
 PUSH_SHARE = 2.0
 """Push that turns a winch outwards against friction, as a multiple of its largest usual
 friction."""
-_USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.25, 6.0, 0.01, 5
-"""Share of a push that turns most winches, and factor on the integral rate beyond it. Time for
-which a winch that does not turn is pushed fully, plus cycles until its encoder could show a motion.
-A rotor whose encoder has failed accelerates unseen, so they are short."""
+_USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.25, 30.0, 0.01, 5
+"""Share of a push that turns most winches, and factor on the integral rate beyond it until the winch
+turns. Time for which a winch that does not turn is pushed fully, plus cycles until its encoder could
+show a motion. A rotor whose encoder has failed accelerates unseen, so this must be short."""
 _FULL_SHARE, _TURNS_SHARE = 0.95, 0.1
 """Share of the highest push that counts as full, and of the commanded speed that shows a motion."""
 _NOISY_m_s, _NOISE_S = 0.5, 0.05
@@ -92,10 +92,10 @@ def control_speed(
             # a loose cable must not be wound up ever faster
             least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
         if least < 0.0 and out < 0.5 * paying_out[i]:
-            pushed = tension[i] <= _FULL_SHARE * least and abs(out) < _TURNS_SHARE * paying_out[i]
-            unseen[i] = unseen[i] + period if pushed else 0.0
+            still = abs(out) < _TURNS_SHARE * paying_out[i]
+            unseen[i] = unseen[i] + period if still and tension[i] <= _FULL_SHARE * least else 0.0
             stuck[i] |= unseen[i] > _UNSEEN_S + _UNSEEN_CYCLES * period
-            if tension[i] < _USUAL_SHARE * least and cable[i] * integral[i] > 0.0:
+            if still and tension[i] < _USUAL_SHARE * least and cable[i] * integral[i] > 0.0:
                 rate *= _HURRY
         else:
             unseen[i] = 0.0

@@ -582,8 +582,10 @@ class Slip:
     """Highest tension when the cable becomes taut again, after any slip."""
 
 
-def slips(s: Subject) -> list[Slip]:
-    """Return for each cable the effects of its slip, at home and at the corners of the targets.
+def slips(s: Subject, places: Sequence[Sequence[float]] | None = None) -> list[Slip]:
+    """Return for each cable the effects of its slip, at the worst of these places.
+
+    By default, they are home and the corners of the targets.
 
     A slip s of cable i moves the pose by J^+ e_i s and has the normalised residual s sqrt(p_ii),
     with P = I - J J^+. A sudden slip is detected by the jump of the residual. Detection by tension
@@ -595,7 +597,9 @@ def slips(s: Subject) -> list[Slip]:
     resting = model.least_tensions(model.low_N + model.reserve_N, model.high_N)
     W, tension_N = np.zeros((model.size, n)), np.zeros(n)
     worst = np.zeros((5, n))
-    for place in (tuple(model.home[:positions].tolist()), *s.corner_targets):
+    if places is None:
+        places = (tuple(model.home[:positions].tolist()), *s.corner_targets)
+    for place in places:
         pose = model.pose(np.array(place))
         J = model.kinematics.jacobian(pose)
         inverse = np.linalg.pinv(J)

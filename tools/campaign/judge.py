@@ -62,8 +62,7 @@ class Predicted:
     """Tension of each cable after a slip, or at the full torque of its motor."""
     off_m: FloatArray
     """Error of the platform's position by an unnoticed slip of each cable."""
-    sudden_m: FloatArray
-    """The largest sudden slip of each cable that is not noticed."""
+    subject: Subject
 
 
 @lru_cache(maxsize=1)
@@ -81,7 +80,8 @@ def predicted(robot: str) -> Predicted:
         [worst(i, lambda swing: swing.fastest_m_s) + s.platform.speed_m_s for i in range(s.n)],
         [worst(i, lambda swing: swing.aside_m) for i in range(s.n)],
         *(_OVER * np.array([getattr(slip, name) for slip in slipped])
-          for name in ("peak_N", "off_m", "sudden_m")),
+          for name in ("peak_N", "off_m")),
+        s,
     )  # fmt: skip
 
 
@@ -149,19 +149,20 @@ class Judge:
         before = int(np.searchsorted(self.truth["time_s"], cause.at_s)) - 1
         if before < 0:
             return False
-        tension_N = self.truth["tension_N"][before]
-        tight = bool((tension_N > 2.0 * np.asarray(self.limits.tension_min_N)).all())
+        pulled = (self.truth["tension_N"][before] / self.limits.tension_min_N).min()
         amount = FAULTS[cause.name].amount(cause.value)
         if cause.name == "slip":
-            sudden_m = predicted(self.played.scenario.robot).sudden_m
-            return tight and 1e-3 * amount > sudden_m[cause.axis]
+            subject = predicted(self.played.scenario.robot).subject
+            place = self.truth["position_m"][before, : subject.model.positions]
+            sudden_m = slips(subject, [place])[cause.axis].sudden_m
+            return pulled > 1.0 and 1e-3 * amount > _OVER * sudden_m
         if cause.name == "encoder-jump":
             turns = abs(amount) / self.robot.axes[cause.axis].winch.encoder_counts_per_turn
             return turns * math.tau > _SURE_JUMP_rad
         if cause.name == "silence":
             tolerated_s = self.limits.missed_cycles * self.robot.sync_period_s
             return 1e-3 * amount > 2.0 * tolerated_s
-        return cause.name == "cut-cable" and tight
+        return cause.name == "cut-cable" and pulled > 2.0
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""
@@ -414,11 +415,9 @@ def what_matters_is_noticed(j: Judge) -> Iterator[str]:
 
 def _off_m(j: Judge, moves: BoolArray) -> FloatArray:
     """Return the error of each recorded position, 0 where it does not count; inf for nan."""
-    rows = j.played.rows
-    if rows.size != j.truth.size:  # there were SYNCs without a row, as in a stall
-        return np.zeros(1)
-    off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"], axis=1)
-    return np.where(moves, np.nan_to_num(off_m, nan=np.inf), 0.0)
+    rows, at = j.played.rows, j.played.row_truth
+    off_m = np.linalg.norm(rows["pose"][:, :3] - j.truth["position_m"][at], axis=1)
+    return np.where(moves[at] & (at >= 0), np.nan_to_num(off_m, nan=np.inf), 0.0)
 
 
 _LENGTHENS: Final = ("slip", "encoder-jump")

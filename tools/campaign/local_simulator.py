@@ -89,6 +89,7 @@ class LocalSimulator(RobotSimulator):
             )
         ]
         drives[0].record_with(PoseLog(self.truth_log, body))
+        self._first_drive = drives[0]
         self.hubs: list[Hub] = []
         urls = robot_urls(robot, [self.bus])
         for bus in robot.buses:
@@ -105,6 +106,11 @@ class LocalSimulator(RobotSimulator):
     @override
     def await_ready(self) -> str:
         return ""
+
+    @property
+    def sync_count(self) -> int:
+        """Number of SYNCs so far, as in the log of the truth."""
+        return self._first_drive.sync_count
 
     @override
     def _ask(self, key: str, value: Any = True) -> Any:

@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import load_robot
+from cdpr_rt.arrays import IntArray
 from cdpr_rt.core.cycle_row import FIELDS, WALL_TIMES
 from cdpr_rt.robot import Error
 from cdpr_rt.service.lease import LeaseError
@@ -25,7 +26,7 @@ from cdpr_tools.campaign.local_simulator import LocalSimulator
 from cdpr_tools.campaign.scenario import BEFORE_BOOT, READY, TIGHT, Action, Scenario
 from cdpr_tools.client.status_text import next_steps
 from cdpr_tools.lockstep_robot import LockstepRobot
-from cdpr_tools.recordings.truth import read_pose_log
+from cdpr_tools.recordings.truth import NO_SYNC, read_pose_log
 
 _TIGHTEN_S: Final = 120.0
 _SETTLE_S: Final = 30.0
@@ -66,6 +67,8 @@ class Played:
     truth: Any = None
     """Records of the pose log since the beginning."""
     rows: Any = None
+    row_truth: Any = None
+    """Number of the record of the truth at each row, -1 if there is none."""
     last_truth: dict[str, Any] = field(default_factory=dict)
     rise_MB: float = 0.0
     output: str = ""
@@ -114,6 +117,8 @@ class Player:
         self._seen = -1
         self._random = random.Random(f"stream {scenario.seed}")
         self._plans = 0
+        self._syncs: list[tuple[int, int]] = []
+        """Number of rows and of SYNCs after each group of cycles."""
 
     def play(self) -> Played:
         """Carry out all actions and faults; return what happened."""
@@ -162,6 +167,7 @@ class Player:
         end_s = self._now_s + seconds - 0.5 * self._rig.period_s
         while self._now_s < end_s:
             self._rig.turn(_LOOK_CYCLES)
+            self._syncs.append((self._rig.rows_written, self._simulator.sync_count))
             self._look()
 
     def _run_until(self, done: Callable[[], bool], within_s: float) -> bool:
@@ -370,7 +376,7 @@ class Player:
             self._first_truth :
         ]
         rows = rig.kept_rows(self._first_row)
-        played.rows = rows
+        played.rows, played.row_truth = rows, self._row_truth(rows.size)
         digest = hashlib.sha256(played.truth.tobytes())
         for name in FIELDS:
             if name not in WALL_TIMES:
@@ -381,6 +387,22 @@ class Player:
         if self._scenario.recorded and rig.recorder is not None:
             rig.recorder.finish()
             played.recordings = sorted((rig.folder / _RECORDING).glob("*.mcap"))
+
+    def _row_truth(self, kept: int) -> IntArray:
+        """Return the number of the record of the truth at each of the last rows, -1 for none.
+
+        The loop counts its cycles from its start, the log has more records than SYNCs in a stall.
+        """
+        sync_index = self.played.truth["sync_index"]
+        records = np.flatnonzero(sync_index != NO_SYNC)
+        row = self._rig.rows_written - kept + np.arange(kept)
+        written, syncs = np.array([*self._syncs, (np.inf, 0)]).T
+        group = np.searchsorted(written, row, side="right")
+        sync = syncs[group] - (written[group] - row)
+        at = np.searchsorted(sync_index[records], sync)
+        found = at < records.size
+        found[found] = sync_index[records[at[found]]] == sync[found]
+        return np.where(found, records[np.where(found, at, 0)], -1)
 
 
 _TIGHTEN: Final = {"do": "program", "program": "tighten"}
