@@ -30,9 +30,10 @@ PUSH_SHARE = 2.0
 """Push that turns a winch outwards against friction, as a multiple of its largest usual
 friction."""
 _USUAL_SHARE, _HURRY, _UNSEEN_S, _UNSEEN_CYCLES = 0.25, 30.0, 0.01, 5
-"""Share of a push that turns most winches, and factor on the integral rate beyond it until the winch
-turns. Time for which a winch that does not turn is pushed fully, plus cycles until its encoder could
-show a motion. A rotor whose encoder has failed accelerates unseen, so this must be short."""
+"""Share of a push that turns most winches, and factor on the integral rate beyond it, until the
+winch turns. Time for which a winch that does not turn is pushed fully, plus cycles until its
+encoder could show a motion. A rotor whose encoder has failed accelerates unseen: this must be
+short."""
 _FULL_SHARE, _TURNS_SHARE = 0.95, 0.1
 """Share of the highest push that counts as full, and of the commanded speed that shows a motion."""
 _NOISY_m_s, _NOISE_S = 0.5, 0.05

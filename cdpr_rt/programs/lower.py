@@ -35,6 +35,8 @@ _FASTEST = 1.5
 _LIGHT = 0.2
 _SPARE_HOME_m = 0.01
 """Cable paid out at home in addition to the length that reaches the stand."""
+_DISOBEYS_m = 0.03
+"""Cable that a winch may wind in while all of them set the platform down."""
 _STILL_m = 0.001
 _RUNNING_IN_m_s = 0.02
 _STILL_S = 1.0
@@ -81,7 +83,8 @@ class LowerProgram(PlatformProgram):
     each winch pays out the length that its cable needs to reach the stand from the last set-point,
     against friction if necessary. If a push greater than the friction does not turn a winch, the
     winch ignores commands, or its cable also holds without power. The program ends when the torque
-    has faded out and no cable has then run out for a second.
+    has faded out and no cable has then run out for a second. If a winch winds in cable while the
+    platform is set down at home, the program ends immediately.
     """
 
     name = "lower"
@@ -111,7 +114,7 @@ class LowerProgram(PlatformProgram):
         self._home_s, self._down_s = _home_s(parts.platform), _down_s(parts.platform)
         self._drum_tension_N = np.zeros(cable_m.size)
         self._cable = np.array(cable_m)
-        self._here = np.zeros(cable_m.size)
+        self._here, self._down_rad = np.zeros((2, cable_m.size))
         self._stage = self._trouble = ""
         self._cycles = self._still = 0
         self._without_pose = self._was_tight = False
@@ -155,7 +158,8 @@ class LowerProgram(PlatformProgram):
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self._winches.update(feedback, torque_Nm)
-        self._watch_rest(feedback)
+        if self._without_pose or not self._is_dragged(feedback):
+            self._watch_rest(feedback)
         if self._at_rest:
             torque_Nm[:] = 0.0
 
@@ -227,6 +231,7 @@ class LowerProgram(PlatformProgram):
         self, feedback: AxisFeedback, torque_Nm: FloatArray, speed_m_s: float, rate_1_s: float
     ) -> None:
         self._parts.tight = False
+        self._down_rad[:] = feedback.position_rad
         self._stage = "down"
         self._still = self._cycles = 0
         winches = self._winches
@@ -241,6 +246,19 @@ class LowerProgram(PlatformProgram):
         plausible = np.abs(self._velocity) < fastest
         winches.begin(feedback, np.where(plausible, self._velocity, 0.0), torque_Nm)
         self._control.clear_compensation()
+
+    def _is_dragged(self, feedback: AxisFeedback) -> bool:
+        """Return whether a winch winds in cable; then end at once, while the platform stands."""
+        in_m = self._cable * (self._down_rad - feedback.position_rad)
+        i = int(in_m.argmax())
+        if in_m[i] <= _DISOBEYS_m:
+            return False
+        self._trouble = (
+            f"{self._parts.names[i]} wound in {1e3 * in_m[i]:.0f} mm while the cables set the "
+            "platform down: its drive does not obey, or its cable is broken"
+        )
+        self._parts.last_stop.displaced = self._at_rest = True
+        return True
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         winches, period_s = self._winches, self._parts.period_s

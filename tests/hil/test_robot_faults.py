@@ -327,6 +327,18 @@ def test_a_platform_not_at_rest_after_lowering_ends_in_a_fault(hanging: Lockstep
     assert hanging.machine.unpowered()
 
 
+def test_a_winch_that_does_not_obey_cannot_drag_the_platform_off_its_stand(
+    hanging: LockstepRobot,
+) -> None:
+    truth = Truth(hanging)
+    hanging.simulator.inject("torque-stuck", UPPER_RIGHT + 1)
+    hanging.block.post_command({"do": "disable", "client": "test"})
+    end_of_fault(hanging)
+    assert "upper right wound in" in hanging.loop.life.reason
+    hanging.run(0.5)
+    assert np.linalg.norm(truth.read()["position_m"][-1, :2] - (0.0, 1.3)) < 0.06
+
+
 def test_drives_that_are_all_silent_for_too_many_cycles_lower_the_platform(
     hanging: LockstepRobot,
 ) -> None:

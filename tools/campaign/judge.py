@@ -189,6 +189,11 @@ class Judge:
         changes = [(a if a >= fall.off_s else b, b) for a, b in times if b >= fall.off_s]
         return any(a <= fall.began_s <= b + _RELEASED_S for a, b in changes)
 
+    def winches_left(self, fall: Fall) -> int:
+        """Return how many winches could lower the platform before it fell; all after one fault."""
+        lost = {c.axis for c in self.causes if c.name in _LOSES and c.at_s < fall.off_s}
+        return self.n - len(lost) if len(lost) > 1 else self.n
+
     @property
     def up(self) -> int:
         """Number of the coordinate that points upward."""
@@ -244,6 +249,10 @@ class Cause:
 
 _GONE: Final = ("drive-off", "drive-reboot", "bus-off", "bus-lost", "silence")
 _NOT_OPERATIONAL: Final = ("pre-operational", "nmt-stop", "duplicate-node")
+_LOSES: Final = (
+    *_GONE, *_NOT_OPERATIONAL, "drive-fault", "power-lost", "torque-stuck", "cut-cable",
+)  # fmt: skip
+"""Faults after which a winch cannot lower the platform."""
 _ON_THE_BUS: Final = (
     "no-heartbeat", "heartbeat-late", "emcy", "emcy-flood", "frames-doubled", "index-missed",
 )  # fmt: skip
@@ -371,6 +380,7 @@ def falls_have_a_cause(j: Judge) -> Iterator[str]:
             any(0.0 <= fall.off_s - at_s < _DEAD_WITHIN_S for at_s in cut)
             or "it may fall when the power goes off" in reason
             or j.released(fall)
+            or j.winches_left(fall) <= j.up
         )
         if not unavoidable:
             yield f"{fall} without power: {reason}"
@@ -485,9 +495,8 @@ def no_exception(j: Judge) -> Iterator[str]:
 
 def numbers_are_finite(j: Judge) -> Iterator[str]:
     """A torque that is not a number is an undefined command."""
-    for name in ("torque_sent_Nm",):
-        if j.played.rows.size and not np.isfinite(j.played.rows[name]).all():
-            yield f"{name} is not finite"
+    if not np.isfinite(j.played.rows["torque_sent_Nm"]).all():
+        yield "torque_sent_Nm is not finite"
     for name in ("position_m", "tension_N", "torque_Nm"):
         if not np.isfinite(j.truth[name]).all():
             yield f"the simulator's {name} is not finite"

@@ -310,7 +310,11 @@ class Player:
             rig.right.take("campaign")
         self._run(0.1)
         engine = rig.loop.engine
-        self._run_until(lambda: not engine.driving or engine.program.at_rest, _TIGHTEN_S)
+        # a stream never comes to rest
+        self._run_until(
+            lambda: not engine.driving or engine.program.at_rest or engine.program.name == "pose",
+            _TIGHTEN_S,
+        )
         played.recovered = False
         # the hand that has pushed a loose platform from its stand also carries it back
         pushed = any(fault["fault"].startswith("push") for fault in self._scenario.faults)
