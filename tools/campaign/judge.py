@@ -58,11 +58,11 @@ class Predicted:
     """Downward speed after the loss of each cable or drive, or of the lengths."""
     aside_m: list[float]
     """Horizontal way after the same losses."""
+    subject: Subject
     peak_N: FloatArray
     """Tension of each cable after a slip, or at the full torque of its motor."""
     off_m: FloatArray
     """Error of the platform's position by an unnoticed slip of each cable."""
-    subject: Subject
 
 
 @lru_cache(maxsize=1)
@@ -79,9 +79,9 @@ def predicted(robot: str) -> Predicted:
     return Predicted(
         [worst(i, lambda swing: swing.fastest_m_s) + s.platform.speed_m_s for i in range(s.n)],
         [worst(i, lambda swing: swing.aside_m) for i in range(s.n)],
+        s,
         *(_OVER * np.array([getattr(slip, name) for slip in slipped])
           for name in ("peak_N", "off_m")),
-        s,
     )  # fmt: skip
 
 
