@@ -248,7 +248,7 @@ class LowerProgram(PlatformProgram):
         self._control.clear_compensation()
 
     def _is_dragged(self, feedback: AxisFeedback) -> bool:
-        """Return whether a winch winds in cable; then end at once, while the platform stands."""
+        """Return whether a winch winds in cable; end then, while the platform stands."""
         in_m = self._cable * (self._down_rad - feedback.position_rad)
         i = int(in_m.argmax())
         if in_m[i] <= _DISOBEYS_m:

@@ -68,7 +68,7 @@ class Played:
     """Records of the pose log since the beginning."""
     rows: Any = None
     row_truth: Any = None
-    """Number of the record of the truth at each row, -1 if there is none."""
+    """Number of the record of the truth at each row, or -1."""
     last_truth: dict[str, Any] = field(default_factory=dict)
     rise_MB: float = 0.0
     output: str = ""
