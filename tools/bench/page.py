@@ -97,16 +97,22 @@ async ([begin, count]) => {
 def _chromium() -> Iterator[Browser]:
     found = shutil.which("chromium") or shutil.which("chromium-browser")
     try:
-        from playwright.sync_api import sync_playwright  # noqa: PLC0415  # only developers have it
+        # only developers have it
+        from playwright.sync_api import Error as PlaywrightError  # noqa: PLC0415
+        from playwright.sync_api import sync_playwright  # noqa: PLC0415
     except ModuleNotFoundError:
         found = None
     if found is None:
         raise BadInputError("needs Chromium (package chromium) and `pip install playwright`")
-    with (
-        sync_playwright() as api,
-        closing(api.chromium.launch(executable_path=found, args=[*_NO_GRAPHICS])) as browser,
-    ):
-        yield browser
+    try:
+        with (
+            sync_playwright() as api,
+            closing(api.chromium.launch(executable_path=found, args=[*_NO_GRAPHICS])) as browser,
+        ):
+            yield browser
+    except PlaywrightError as error:
+        why = error.message.partition("\n")[0]
+        raise WorkFailedError(f"Chromium: {why} Is the machine busy with other work?") from None
 
 
 def _opened(browser: Browser, url: str) -> Page:

@@ -83,7 +83,7 @@ const VIEWS: View[] = [
 ];
 
 function App() {
-  const { description } = useStore();
+  const { description, connected } = useStore();
   const { view } = useView();
   const views = VIEWS.filter(({ suits }, number) => number === 0 || (hasKey() && description && (suits?.(description) ?? true)));
   const { name, title, component: Shown } = views.find((one) => one.name === view) ?? views[0]!;
@@ -102,7 +102,7 @@ function App() {
         )}
         <RejectedMessage />
       </div>
-      <main>
+      <main class={connected ? "" : "stale"}>
         <NextStep />
         <Shown />
       </main>

@@ -18,6 +18,8 @@ export type Drives = components["schemas"]["Drives"];
 export type DriveObject = components["schemas"]["DriveObject"];
 type Path = keyof paths | `/recordings/${string}`;
 
+export const NO_ANSWER = "The daemon does not answer. Is `cdpr run` still running?";
+
 /** A request that the daemon rejected, or that did not reach it. */
 export class Rejected extends Error {}
 
@@ -80,7 +82,7 @@ export async function request<T>(
   try {
     answer = await fetch(path, { method, headers, signal, body: body === undefined ? null : JSON.stringify(body) });
   } catch {
-    throw new Rejected("The daemon does not answer. Is `cdpr run` still running?");
+    throw new Rejected(NO_ANSWER);
   }
   if (answer.status === UNAUTHORIZED) setKey(""); // the key of an earlier run: ask for the present one
   const text = await answer.text();

@@ -154,7 +154,7 @@ export function Trends() {
 }
 
 function TrendView({ title, curves, values, floor }: { title: string; curves: Curve[]; values: (cycle: Cycle) => (number | null)[]; floor: number }) {
-  const host = useRef<HTMLDivElement>(null), trend = useRef<Trend | null>(null), count = useRef(0);
+  const host = useRef<HTMLDivElement>(null), trend = useRef<Trend | null>(null);
   useEffect(() => {
     trend.current = new Trend(host.current!, curves, floor);
     store.recent.forEach((cycle) => trend.current!.add(cycle.time_s, values(cycle)));
@@ -163,7 +163,7 @@ function TrendView({ title, curves, values, floor }: { title: string; curves: Cu
   }, [curves.map((one) => one.name).join()]);
   useCycles((cycle) => {
     trend.current?.add(cycle.time_s, values(cycle));
-    if (count.current++ % 3 === 0) trend.current?.draw(); // ten times a second is enough for a curve
+    trend.current?.draw();
   }, []);
   return (
     <figure>

@@ -17,6 +17,9 @@ const LOW = new Color("#3d8bd4"), MIDDLE = new Color("#3fae6b"), HIGH = new Colo
 const SURE = 0.9, UNSURE = 0.3;
 const UP = new Vector3(0, 1, 0);
 const LOOK_MS = 4, SLOW_MS = 25, SHARE = 4;
+/** Smaller changes of a pose or a tension are not drawn. */
+const VISIBLE_M = 2e-4, VISIBLE_N = 2;
+const UNKNOWN = 1e9;
 const SMALLEST_BODY_M = 0.04;
 
 /** A point of the robot's file as a vector; in a plane the third coordinate is 0. */
@@ -91,7 +94,7 @@ export class RobotScene {
   numbered = false;
   #asked = false;
   #again = false;
-  #shown = "";
+  #shown: number[] = [];
   #observer: ResizeObserver;
 
   /** Throws if the browser offers no WebGL. */
@@ -124,6 +127,7 @@ export class RobotScene {
   /** Build the scene of a robot; z of a spatial robot points up, and y of a planar one. */
   describe(description: Description): void {
     this.#description = description;
+    this.#shown = [];
     this.#room.clear();
     this.#platform.clear();
     this.#ghost.clear();
@@ -152,8 +156,8 @@ export class RobotScene {
   show(cycle: Cycle): void {
     const platform = this.#description?.platform;
     if (!platform) return;
-    const seen = [cycle.pose.map((one) => one?.toFixed(4)), cycle.tension_N.map((one) => one && Math.round(one / 2))].join();
-    if (seen === this.#shown) return; // nothing that one could see has changed
+    const seen = [...cycle.pose.map((one) => (one ?? UNKNOWN) / VISIBLE_M), ...cycle.tension_N.map((one) => (one ?? UNKNOWN) / VISIBLE_N)];
+    if (seen.every((one, place) => Math.abs(one - (this.#shown[place] ?? Infinity)) < 1)) return; // noise does not cost pictures
     this.#shown = seen;
     const [x, y, z, w, qx, qy, qz] = cycle.pose;
     this.#block.opacity = x == null ? UNSURE : SURE;

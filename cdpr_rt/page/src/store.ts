@@ -1,6 +1,6 @@
 // What the page knows about the robot; components redraw on changes, and cycles go to their listeners directly.
 import { useEffect, useState } from "preact/hooks";
-import { type Cycle, type DaemonEvent, type Description, type Planned, Rejected, Right, type Status, follow, request } from "./daemon";
+import { type Cycle, type DaemonEvent, type Description, NO_ANSWER, type Planned, Rejected, Right, type Status, follow, request } from "./daemon";
 import { progressOf } from "./situation";
 
 const KEPT_EVENTS = 60;
@@ -48,7 +48,8 @@ class Store {
       cycle: (value) => this.#keep(value),
       connected: (value) => {
         if (value === this.connected && value) return;
-        this.change({ connected: value }); // a rejected key is shown although the page was not connected before
+        const rejected = value && this.rejected === NO_ANSWER ? "" : this.rejected;
+        this.change({ connected: value, rejected }); // a rejected key is shown although the page was not connected before
         if (value) void this.#earlierEvents();
       },
     });

@@ -3,6 +3,8 @@ import uPlot from "uplot";
 
 export const SPAN_S = 30;
 const RATE_Hz = 30;
+/** Ten pictures a second are enough for a curve. */
+const DRAW_MS = 100, SHARE = 3;
 const POINTS = SPAN_S * RATE_Hz;
 const COLOURS = ["#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#7a8797"];
 
@@ -14,13 +16,15 @@ export interface Curve {
 const css = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** How the axes of all plots look. */
-export const axisStyle = () => ({ stroke: () => css("--muted"), grid: { stroke: () => css("--line") }, ticks: { show: false }, font: "11px system-ui" });
+export const axisStyle = () => ({ stroke: () => css("--muted"), grid: { width: 1, stroke: () => css("--line") }, ticks: { show: false }, font: "11px system-ui" });
 
 /** A plot against bus time that keeps `SPAN_S`; older points leave it. */
 export class Trend {
   #plot: uPlot;
   #data: (number | null)[][];
   #observer: ResizeObserver;
+  /** When the next picture may begin; not before the present one is shown. */
+  #next_ms = 0;
 
   /** `floor`: the vertical axis ends there or higher. */
   constructor(host: HTMLElement, curves: Curve[], floor: number) {
@@ -61,7 +65,13 @@ export class Trend {
 
   draw(): void {
     const times = this.#data[0]!;
-    if (!times.length) return;
+    const began_ms = performance.now();
+    if (!times.length || began_ms < this.#next_ms) return;
+    this.#next_ms = Infinity;
+    requestAnimationFrame(() => setTimeout(() => {
+      const cost_ms = performance.now() - began_ms;
+      this.#next_ms = began_ms + Math.max(DRAW_MS, SHARE * cost_ms); // a slow machine has time for a stop, too
+    }));
     const end = times[times.length - 1]!;
     this.#plot.setData(this.#data as uPlot.AlignedData, false);
     this.#plot.setScale("x", { min: end - SPAN_S, max: end });
