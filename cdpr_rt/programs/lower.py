@@ -116,19 +116,21 @@ class LowerProgram(PlatformProgram):
         self._cable = np.array(cable_m)
         self._here, self._down_rad = np.zeros((2, cable_m.size))
         self._stage = self._trouble = ""
-        self._cycles = self._still = 0
+        self._cycles = self._still = self._cycle = 0
         self._without_pose = self._was_tight = False
         self._velocity = parts.estimator.estimate.velocity_rad_s
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Continue from the present set-point and torque, (n,) each."""
         self._cycles = self._still = 0
-        self._was_tight = self._parts.tight
-        self._without_pose = not self._was_tight
+        # a fault while the cables set the platform down: they still pull
+        continues = self._stage == "down" and 0 <= feedback.cycle - self._cycle <= 1
+        self._was_tight = self._parts.tight or continues
+        self._without_pose = not self._parts.tight
         self._trouble = ""
         self._winches.left_m[:] = 0.0  # may remain from a lowering that was interrupted
         # slack cables keep their slack
-        self._drum_tension_N[:] = 0.0 if self._without_pose else DRUM_TENSION_SHARE * self._least
+        self._drum_tension_N[:] = 0.0 if not self._was_tight else DRUM_TENSION_SHARE * self._least
         self._stage = "home"
         if self._parts.tight:
             super().start(feedback, setpoint, torque_Nm)
@@ -140,6 +142,7 @@ class LowerProgram(PlatformProgram):
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""
         self._cycles += 1
+        self._cycle = feedback.cycle
         if self._stage == "home" and not self._without_pose:
             super().update(feedback, setpoint, torque_Nm)
             self._at_rest = False
@@ -150,7 +153,7 @@ class LowerProgram(PlatformProgram):
                 self._without_pose = True  # obstructed
             return
         if self._stage == "home":
-            if self._parts.tight:
+            if self._was_tight:
                 self._parts.last_stop.displaced = True
                 self._need(SPARE_m + self._parts.platform.home_tolerance_m)
                 self._carry_weight(torque_Nm)

@@ -339,6 +339,18 @@ def test_a_winch_that_does_not_obey_cannot_drag_the_platform_off_its_stand(
     assert np.linalg.norm(truth.read()["position_m"][-1, :2] - (0.0, 1.3)) < 0.06
 
 
+def test_a_drive_lost_while_the_platform_is_set_down_does_not_fling_it_up(
+    hanging: LockstepRobot,
+) -> None:
+    hanging.block.post_command({"do": "disable", "client": "test"})
+    lower = hanging.loop.engine.parts.programs["lower"]
+    hanging._turn_until(lambda: lower.progress().get("stage") == "down", 20.0, "home")
+    truth = Truth(hanging)
+    hanging.inject(LOWER, 1, 0x7305)
+    assert speed_at_power_off_m_s(hanging, truth) < 0.02
+    assert truth.read()["position_m"][:, 1].max() < 1.3 + 0.05
+
+
 def test_drives_that_are_all_silent_for_too_many_cycles_lower_the_platform(
     hanging: LockstepRobot,
 ) -> None:
