@@ -112,13 +112,13 @@ def test_an_enable_whose_body_comes_after_a_stop_gives_no_power(daemon: RealDaem
             slow.settimeout(PATIENCE_S)
             slow.connect(str(daemon.socket))
             head = f"""POST /enable HTTP/1.1\r\nHost: robot\r\nX-Control-Token: {token}\r
-Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"""
+Content-Type: application/json\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"""
             slow.sendall(head.encode() + body[:-1])
             client.get("/status")  # answered after the head of the enable was read
             if not accepted:
                 assert send_stop(stop, "disable", "fast", PATIENCE_S)
             slow.sendall(body[-1:])
-            answer = slow.recv(65536)
+            answer = b"".join(iter(lambda: slow.recv(65536), b""))
             client.release(token)
         assert (b"200 OK" in answer) is accepted, answer
         assert (b"cancelled by a later stop" in answer) is not accepted

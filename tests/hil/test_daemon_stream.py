@@ -157,6 +157,7 @@ def test_packets_without_key_or_session_move_nothing_while_the_holder_is_silent(
 def test_a_second_daemon_is_rejected_and_a_listener_is_accepted(
     daemon: RealDaemon, folder: Path
 ) -> None:
+    daemon.http.post("/disable", json={})
     daemon.wait_for("ready")
     other = folder / "other.sock"
     told = cdpr("run", daemon.robot, "--bus", daemon.bus, "--socket", other, "--no-record")

@@ -238,6 +238,7 @@ def test_a_stopped_move_continues_to_its_target(
 ) -> None:
     with opened(browser, address(daemon)) as page:
         see(page, "Holding the platform")
+        page.get_by_label("Speed").select_option("10")
         send_to(page, "300", "2200")
         see(page, "Moving")
         press(page, "Pause")
