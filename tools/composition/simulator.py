@@ -62,7 +62,8 @@ class _OwnProcess:
     def await_ready(self) -> str:
         """Wait for the line of JSON with `ready` that the process prints, and return it.
 
-        If the process ends instead, raises BadInputError or WorkFailedError, as it did.
+        If the process ends instead, raises the error that its exit status stands for:
+        BadInputError or WorkFailedError.
         """
         out, errors = self._pipe(self.process.stdout), self._pipe(self.process.stderr)
         deadline, output = time.monotonic() + _START_TIMEOUT_S, ""
