@@ -9,8 +9,8 @@ BIN := $(VENV)/bin
 # two more than there are cores: some tests wait for time-outs
 JOBS ?= $(shell expr $$(nproc) + 2)
 SOAK_MINUTES ?= 10
-# tests that are not about the wall clock, which one after another runs at the end
-WHICH ?= not alone
+# the others run at the end: a busy machine would delay a browser, or change what they measure
+WHICH ?= not alone and not browser
 
 .PHONY: demo test test-all tests soak check docs page lock clean
 
@@ -21,7 +21,8 @@ test: $(STAMP)  ## every check, and the tests but long ones: some minutes
 	@$(MAKE) -j 2 check tests WHICH="not alone and not long"
 
 test-all: $(STAMP)  ## every check and every test; needs nothing but Python
-	@$(MAKE) -j 2 check tests WHICH="not alone"
+	@$(MAKE) -j 2 check tests WHICH="not alone and not browser"
+	$(BIN)/python -m pytest -n 2 --dist loadscope -m browser tests/hil/test_*_page.py
 	$(BIN)/python -m pytest -m alone $$(grep -rl "mark\.alone" tests --include="test_*.py")
 
 tests: $(COMPILED)

@@ -16,8 +16,6 @@ from typing import Any
 
 import pytest
 
-from cdpr_profiles import load_robot
-from cdpr_tools.campaign.local_simulator import LocalSimulator
 from cdpr_tools.lockstep_robot import LockstepRobot
 
 _PR_SET_PDEATHSIG = 1
@@ -30,8 +28,6 @@ class LocalRobot(LockstepRobot):
     else in memory, is lost with the fork. So a fixture of the whole file brings the robot to the
     start of all tests. Other fixtures must not move it, because they do not run in the fork.
     """
-
-    simulator: LocalSimulator
 
     def run_in_fork(self, item: pytest.Function) -> None:
         """Call the test's function in a fork of this process; fail here if it fails there."""
@@ -80,6 +76,5 @@ def local_robot(
     file: str | Path, *, plant: Path | None = None, **more: Any
 ) -> Iterator[LocalRobot]:
     """Yield a robot that is ready."""
-    simulator = LocalSimulator(load_robot(file), plant)
-    with LocalRobot(file, plant=plant, simulator=simulator, pinned=False, **more) as robot:
+    with LocalRobot(file, plant=plant, **more) as robot:
         yield robot

@@ -33,7 +33,6 @@ from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import ControlError
 from cdpr_rt.loop.loop import ControlLoop
-from cdpr_rt.loop.realtime import one_core
 from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.model.robot_arrays import limits_of
 from cdpr_rt.refusal import CommandRefusal
@@ -42,9 +41,10 @@ from cdpr_rt.service import stream_packet
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.rows import cycle_figures
 from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
+from cdpr_tools.composition.local_simulator import LocalSimulator
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
-from cdpr_tools.composition.simulator import LockstepSimulator, OwnLoadCells, RobotSimulator
+from cdpr_tools.composition.simulator import OwnLoadCells
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.recordings.truth import POSES, RecordLog
 
@@ -184,11 +184,10 @@ class LockstepRobot:
     if `learns`. The calibration in force is used only if `as_calibrated`. With
     `calibration_in_doubt`, the limits are those of a robot without a calibration. `scanner` is the
     file in which a simulated external scanner logs the poses it measures, `camera` the socket of a
-    simulated camera on the platform. Rows of the last `ring_s` are kept. If `pinned`, the simulator
-    and all of this process share one core. `simulator` is a simulator that was started with these
-    arguments; it belongs to this robot from `__enter__` on. The right to move is held from the
-    beginning, see `right`. If `boots` is false, the caller boots the robot. Raises CommandError,
-    DriverError and ProfileError as `cdpr run` does, Error if the robot does not get ready.
+    simulated camera on the platform. Rows of the last `ring_s` are kept. The right to move is held
+    from the beginning, see `right`. If `boots` is false, the caller boots the robot. Raises
+    CommandError, DriverError and ProfileError as `cdpr run` does, Error if the robot does not get
+    ready.
     """
 
     look_s = 0.02
@@ -209,11 +208,9 @@ class LockstepRobot:
         scanner: Path | None = None,
         camera: Path | None = None,
         ring_s: float = RING_S,
-        pinned: bool = True,
-        simulator: RobotSimulator | None = None,
         boots: bool = True,
     ) -> None:
-        loaded = load_robot(robot)
+        self._simulated = loaded = load_robot(robot)
         self.robot = with_commissioned(
             calibrated(loaded) if as_calibrated else loaded, commissioned
         )
@@ -223,12 +220,12 @@ class LockstepRobot:
         self._reference = str(robot)
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._scanner, self._camera, self._learns = scanner, camera, learns
-        self._ring_s, self._pinned = ring_s, pinned
-        self._own, self._simulator, self._boots = own, simulator, boots
+        self._ring_s, self._own, self._boots = ring_s, own, boots
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = self._began = 0
         self._closed = False
+        self.simulator: LocalSimulator
         self.description: Mapping[str, Any]
         """The description that the daemon would publish."""
         self.block: SharedBlock
@@ -258,21 +255,16 @@ class LockstepRobot:
 
     def _start(self, stack: ExitStack) -> None:
         robot, limits, port = self.robot, self._limits, None
-        own = None
-        if (simulator := self._simulator) is None:
-            simulator = own = LockstepSimulator(
-                *(robot, self._reference, self._plant),
-                *(self._truth_path, self._scanner, self._camera),
-            )
-        self.simulator = simulator
+        self.simulator = simulator = LocalSimulator(
+            *(self._simulated, self._plant, self._truth_path, self._scanner, self._camera)
+        )
         stack.callback(simulator.stop)
         self.folder = simulator.folder
         self.block = block = SharedBlock.create(
-            len(robot.axes), self._ring_s, 1.0 / self.period_s, private=simulator.local
+            len(robot.axes), self._ring_s, 1.0 / self.period_s, private=True
         )
         stack.callback(os.close, block.fd)
         parts = loop_parts(robot, limits, block, learns=self._learns, own=self._own)
-        simulator.await_ready()
         if simulator.board is not None:
             self.cells = OwnLoadCells(str(robot.tension_sensors), simulator.board)
             stack.callback(self.cells.stop)
@@ -303,8 +295,6 @@ class LockstepRobot:
         self._began = self.rows_written
         if not robot.is_winch:  # the log of a single drive has another format
             self._truth = stack.enter_context(RecordLog(simulator.truth_log, POSES))
-        if self._pinned and own is not None:
-            stack.enter_context(one_core(own.process.pid))
 
     def boot(self) -> None:
         """Boot and check the drives; take the right to move. Raises Error if that fails."""

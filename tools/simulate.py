@@ -1,23 +1,17 @@
-"""`cdpr_rt.simulate`: a robot on simulated drives for a script.
-
-The simulator starts before this process loads the controller, so that both load at the same time.
-"""
+"""`cdpr_rt.simulate`: a robot on simulated drives for a script."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from cdpr_drivers.errors import DriverError
-from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM
 from cdpr_rt.code_loader import CodeError
 from cdpr_rt.errors import ControlError
 from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot, path_of
-from cdpr_tools.composition.simulator import LockstepSimulator
 from cdpr_tools.errors import BadInputError, CommandError
 from cdpr_tools.loading import without_collection
 
@@ -52,10 +46,8 @@ def simulate(
     if plant_file is not None and not plant_file.is_file():
         raise InvalidArgument(f"plant: {plant_file}: no such file")
     try:
-        with ExitStack() as stack, without_collection():
-            simulator = LockstepSimulator(load_robot(robot), str(robot), plant_file)
-            stack.callback(simulator.stop)
-            # imported here, while the simulator starts: both take equally long
+        with without_collection():
+            # imported here, because collection of garbage would take a tenth of the time
             from cdpr_rt.model.own_distribution import (  # noqa: PLC0415
                 checked_distribution,
                 require_code_allowed,
@@ -68,13 +60,12 @@ def simulate(
                 checked_distribution("tension_distribution", tension_distribution)
             named = [(f"programs[{i}]", program) for i, program in enumerate(programs)]
             own = OwnCode(controller, tension_distribution, named)
-            made = LockstepRobot(robot, own=own, ring_s=_LOG_S, pinned=False, simulator=simulator)
+            made = LockstepRobot(robot, plant=plant_file, own=own, ring_s=_LOG_S)
             for name, given in vars(own).items():
                 if given and made.robot.platform is None:
                     raise InvalidArgument(f"{name}: {robot} {NO_PLATFORM}")
             if allow_code:
                 require_code_allowed(made.robot, allow_code=True)
-            stack.pop_all()  # the simulator belongs to the robot now
             return Robot(made.__enter__())
     except (ProfileError, BadInputError) as error:
         raise InvalidRobot(str(error)) from None

@@ -302,7 +302,9 @@ class Hub:
         bitrate: int = 1_000_000,
         name: str = "",
         truth_log: str | None = None,
+        ahead: bool = True,
     ) -> None:
+        """Make the bus. Nodes may work `ahead` while the master works on the present cycle."""
         paced = mode is ClockMode.PACED
         self.nodes = tuple(nodes)
         self.load = BusLoad(bitrate, lockstep=not paced)
@@ -312,7 +314,8 @@ class Hub:
         self._clients: dict[int, Client] = {}
         self._routes: dict[int, Route] = {}
         self._accepts = [node.accepts for node in self.nodes]
-        self.prepares = [node.prepare for node in self.nodes if isinstance(node, PreparingNode)]
+        preparing = self.nodes if ahead else ()
+        self.prepares = [node.prepare for node in preparing if isinstance(node, PreparingNode)]
         # the nodes are switched on at bus time 0
         self._now_s = -1.0
         self._leftover = False

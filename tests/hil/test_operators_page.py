@@ -21,6 +21,7 @@ from tests.slower_robot import slower_robot
 _CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = [
     pytest.mark.long,
+    pytest.mark.browser,
     pytest.mark.skipif(_CHROMIUM is None, reason="no Chromium is installed (package chromium)"),
 ]
 playwright_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

@@ -178,9 +178,7 @@ def _lockstep(cycles: int, out: Output) -> dict[str, Row]:
     with ExitStack() as stack:
         ways = {}
         for name, mine in controllers.items():
-            robot = stack.enter_context(
-                LockstepRobot(ROBOT, own=OwnCode(mine, None, ()), pinned=False)
-            )
+            robot = stack.enter_context(LockstepRobot(ROBOT, own=OwnCode(mine, None, ())))
             robot.enable()
             robot.carry_out("tighten")
             robot.carry_out("pose", position_m=list(_PLACE_m))

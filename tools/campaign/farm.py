@@ -155,7 +155,7 @@ def _from_snapshots(scenarios: Sequence[Scenario], out: int) -> None:
                         start.advance(where)
                     except Error as error:
                         why = str(error)
-                start.simulator.before_fork()
+                start.rig.simulator.before_fork()
                 gc.collect()
                 gc.freeze()
                 for number, scenario in enumerate(scenarios):
@@ -180,7 +180,7 @@ def _fork_seed(scenario: Scenario, start: RobotAtStart, folder: Path) -> Result:
         resource.setrlimit(resource.RLIMIT_CPU, (_SEED_CPU_S, _SEED_CPU_S + 5))
         with output_to(own / _OUTPUT):
             faulthandler.register(signal.SIGXCPU, file=2, chain=True)
-            start.simulator.after_fork(own)
+            start.rig.simulator.after_fork(own)
             start.rig.folder = own
             result = _judged(Player(scenario, start).play(), start, own)
         result.cpu_s = round(time.process_time(), 3)  # a fork begins at 0

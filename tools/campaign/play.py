@@ -16,13 +16,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_profiles import load_robot
 from cdpr_rt.arrays import IntArray
 from cdpr_rt.core.cycle_row import FIELDS, WALL_TIMES
 from cdpr_rt.robot import Error
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.recording import Recorder
-from cdpr_tools.campaign.local_simulator import LocalSimulator
 from cdpr_tools.campaign.scenario import BEFORE_BOOT, READY, TIGHT, Action, Scenario
 from cdpr_tools.client.status_text import next_steps
 from cdpr_tools.lockstep_robot import LockstepRobot
@@ -83,11 +81,9 @@ class RobotAtStart:
     def __init__(self, scenario: Scenario, folder: Path, record: Path | None = None) -> None:
         plant = folder / "plant.toml"
         plant.write_text(scenario.plant_text(), encoding="utf-8")
-        self.simulator = LocalSimulator(load_robot(scenario.robot), plant)
         self.rig = LockstepRobot(
-            scenario.robot, plant=plant, simulator=self.simulator, ring_s=_RING_S,
-            pinned=False, boots=False, record=record,
-        )  # fmt: skip
+            scenario.robot, plant=plant, ring_s=_RING_S, boots=False, record=record
+        )
 
     def advance(self, start: str) -> None:
         """Bring the robot from the start before to this one; raises Error."""
@@ -109,7 +105,7 @@ class Player:
     """Plays one scenario on a robot that is at its start."""
 
     def __init__(self, scenario: Scenario, start: RobotAtStart) -> None:
-        self._scenario, self._rig, self._simulator = scenario, start.rig, start.simulator
+        self._scenario, self._rig, self._simulator = scenario, start.rig, start.rig.simulator
         self.played = Played(scenario, self._now_s)
         self._first_row = self._rig.rows_written
         self._first_truth = self._truth_size()

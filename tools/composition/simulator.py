@@ -8,40 +8,31 @@ import select
 import subprocess
 import sys
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import IO, TYPE_CHECKING, Any
-
-from typing_extensions import override
+from typing import IO
 
 from cdpr_tools.compiling import NOTICE
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.processes import end_by_stdin, module_command
-
-if TYPE_CHECKING:
-    from cdpr_profiles.robot import Robot
-    from cdpr_tools.composition.fault_injection import SimulatorChannel
 
 # if the physics was not compiled at installation, the first start compiles it for some minutes
 _START_TIMEOUT_S = 600.0
 # a process that is only delayed still completes its logs
 _STOP_TIMEOUT_S = 60.0
 
-_numbers, _trials = count(1), count()
+_numbers = count(1)
 
 
 class _OwnProcess:
     """A command of this package that ends when its standard input closes, even if we die."""
 
-    def __init__(
-        self, *command: str, meanwhile: Callable[[], None] | None = None, waits: bool = True
-    ) -> None:
-        """Start the command and, if it `waits`, wait until it is ready, see `await_ready`.
+    def __init__(self, *command: str, meanwhile: Callable[[], None] | None = None) -> None:
+        """Start the command, call `meanwhile`, and wait until it is ready.
 
-        `meanwhile` is called while it starts.
+        If the process ends instead, raises the error that its exit status stands for:
+        BadInputError or WorkFailedError.
         """
         self.process = subprocess.Popen(
             module_command("cdpr_tools.cli", *command, "--exit-with-stdin"),
@@ -53,18 +44,13 @@ class _OwnProcess:
         try:
             if meanwhile is not None:
                 meanwhile()
-            if waits:
-                self.ready = self.await_ready()
+            self.ready = self._await_ready()
         except BaseException:
             self.stop()
             raise
 
-    def await_ready(self) -> str:
-        """Wait for the line of JSON with `ready` that the process prints, and return it.
-
-        If the process ends instead, raises the error that its exit status stands for:
-        BadInputError or WorkFailedError.
-        """
+    def _await_ready(self) -> str:
+        """Wait for the line of JSON with `ready` that the process prints, and return it."""
         out, errors = self._pipe(self.process.stdout), self._pipe(self.process.stderr)
         deadline, output = time.monotonic() + _START_TIMEOUT_S, ""
         heard = [out, errors]
@@ -134,130 +120,23 @@ class OwnSimulator(_OwnProcess):
         scanner: Path | None = None,
         camera: Path | None = None,
         meanwhile: Callable[[], None] | None = None,
-        waits: bool = True,
     ) -> None:
         command = ["sim", "up", winch, "--bus", bus, "--paced" if paced else "--lockstep"]
         command += ["--nodes", str(nodes)]
         if detached:
             command.append("--detached")
-        log = os.environ.get("CDPR_SIM_FRAME_LOG")
         for option, path in (
             ("--plant", plant),
             ("--truth-log", truth_log),
             ("--scanner", scanner),
             ("--board", board),
             ("--camera", camera),
-            ("--frame-log", _numbered(Path(log), next(_numbers)) if log else None),
+            ("--frame-log", next_frame_log()),
         ):
             if path is not None:
                 command += [option, str(path)]
         self.bus = bus
-        super().__init__(*command, meanwhile=meanwhile, waits=waits)
-
-
-class RobotSimulator(ABC):
-    """A simulator of one robot in lockstep, and the folder for its files."""
-
-    local: bool
-    """Whether it runs in this process."""
-    bus: str
-    folder: Path
-    """Folder for temporary files, removed at the end."""
-    truth_log: Path
-    """The log of the true motion."""
-    board: Path | None
-
-    @abstractmethod
-    def await_ready(self) -> str:
-        """Wait until it is ready."""
-
-    @abstractmethod
-    def stop(self) -> None:
-        """End the simulator, and remove its folder."""
-
-    @abstractmethod
-    def _ask(self, key: str, value: Any = True) -> Any:
-        """Return the answer to a request beside the buses; raises BadInputError."""
-
-    def inject(
-        self,
-        fault: str,
-        axis: int | None = None,
-        value: float | None = None,
-        at_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Inject a fault at bus time `at_s`, by default now; return the order with its values.
-
-        `cdpr_sim_bus.cia402.faults` lists the faults; "mend" ends those of an axis, or all. Axes
-        count from 1. The value 0 mends only this fault. Bus time is `truth()["time_s"]`, and the
-        time of a clock that leads the bus. Raises BadInputError for an invalid order.
-        """
-        order = {"fault": fault, "axis": axis, "value": value, "at_s": at_s}
-        return dict(self._ask("fault", order))
-
-    def broken(self) -> list[dict[str, Any]]:
-        """Return what is broken now: `fault`, `axis`, `value`."""
-        return list(self._ask("broken"))
-
-    def truth(self) -> dict[str, Any]:
-        """Return the truth now, for a judge: `time_s`, `drives`, `platform`, `faults`.
-
-        It needs no running loop. Each of `faults` has `fault`, `axis`, `value`, `at_s`, `ended_s`.
-        """
-        return dict(self._ask("truth"))
-
-
-class LockstepSimulator(OwnSimulator, RobotSimulator):
-    """A simulator of `robot` in lockstep, on a separate bus, with a folder for its files.
-
-    The process has started, but it is ready only after `await_ready`. `reference` is the name or
-    file of the robot. The true pose of a platform is logged to `truth_log`, by default to a file in
-    the folder.
-    """
-
-    local = False
-
-    def __init__(
-        self,
-        robot: Robot,
-        reference: str,
-        plant: Path | None,
-        truth_log: Path | None = None,
-        scanner: Path | None = None,
-        camera: Path | None = None,
-    ) -> None:
-        self._channel: SimulatorChannel | None = None
-        self._temporary = TemporaryDirectory(prefix="cdpr-trial-")
-        self.folder = Path(self._temporary.name)
-        self.truth_log: Path = truth_log or self.folder / "truth.log"
-        self._robot = robot
-        self.board = None if robot.tension_sensors is None else self.folder / "board"
-        super().__init__(
-            *(reference, f"simbus:trial-{os.getpid()}-{next(_trials)}", plant, self.truth_log),
-            board=self.board,
-            scanner=scanner,
-            camera=camera,
-            waits=False,
-        )
-
-    @override
-    def _ask(self, key: str, value: Any = True) -> Any:
-        if self._channel is None:
-            # imported here: the buses load slowly, and a simulator must start before that
-            from cdpr_drivers.robot.robot_buses import robot_urls  # noqa: PLC0415
-            from cdpr_tools.composition.fault_injection import SimulatorChannel  # noqa: PLC0415
-
-            url = next(iter(robot_urls(self._robot, [self.bus]).values()))
-            self._channel = SimulatorChannel(url)
-        return self._channel.ask(key, value)
-
-    @override
-    def stop(self) -> None:
-        """End the simulator, and remove its folder."""
-        if self._channel is not None:
-            self._channel.close()
-        super().stop()
-        self._temporary.cleanup()
+        super().__init__(*command, meanwhile=meanwhile)
 
 
 class OwnCamera(_OwnProcess):
@@ -268,5 +147,10 @@ class OwnCamera(_OwnProcess):
         super().__init__("sim", "camera", str(socket), "--board", str(board), *more)
 
 
-def _numbered(path: Path, number: int) -> Path:
+def next_frame_log() -> Path | None:
+    """Return the file for the frames of the next simulator of this process; None without one."""
+    log = os.environ.get("CDPR_SIM_FRAME_LOG")
+    if not log:
+        return None
+    path, number = Path(log), next(_numbers)
     return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

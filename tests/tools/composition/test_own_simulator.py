@@ -1,4 +1,4 @@
-"""A simulator that a command starts: work during its start, and a failed start."""
+"""A simulator that a command starts, and that fails to start."""
 
 from __future__ import annotations
 
@@ -11,25 +11,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from typing_extensions import override
-
-from cdpr_tools.composition.simulator import OwnSimulator
-from tests.tools.robot_rig import unique
-
-
-def test_work_is_done_while_the_simulator_starts() -> None:
-    done: list[str] = []
-
-    class Noted(OwnSimulator):
-        @override
-        def await_ready(self) -> str:
-            assert self.process.poll() is None
-            done.append("waiting")
-            return super().await_ready()
-
-    bus = f"simbus:{unique()}"
-    Noted("winch-mpp0923d", bus, meanwhile=lambda: done.append("work")).stop()
-    assert done == ["work", "waiting"]
 
 
 def _command_lines() -> Iterator[str]:

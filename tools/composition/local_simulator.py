@@ -20,18 +20,17 @@ from cdpr_drivers.bus.simbus import in_this_process
 from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import Robot
 from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.bus.server import with_frame_log
 from cdpr_sim_bus.cia402.fault_bench import FaultBench
-from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.errors import RequestError
-from cdpr_sim_bus.robot.truth_log import PoseLog
-from cdpr_tools.composition.robot_physics import physics_of
-from cdpr_tools.composition.simulator import RobotSimulator
+from cdpr_tools.composition.robot_physics import frame_log_at, simulated_drives
+from cdpr_tools.composition.simulator import next_frame_log
 from cdpr_tools.errors import BadInputError
 
 _numbers = count()
 _MASTER = b"\0cdpr-rt/master/"
 _BUFFER_BYTES = 1 << 21
+_DONTWAIT = int(socket.MSG_DONTWAIT)  # arithmetic of enumerations is slow
 
 
 class LocalConnection(socket.socket):
@@ -47,54 +46,75 @@ class LocalConnection(socket.socket):
     def recv(self, bufsize: int, flags: int = 0, /) -> bytes:
         while True:
             try:
-                return super().recv(bufsize, flags | socket.MSG_DONTWAIT)
+                return super().recv(bufsize, flags | _DONTWAIT)
             except BlockingIOError:
-                self._run(flags)
+                self._turn(flags)
 
     @override
     def recv_into(self, buffer: Buffer, nbytes: int = 0, flags: int = 0) -> int:
         while True:
             try:
-                return super().recv_into(buffer, nbytes, flags | socket.MSG_DONTWAIT)
+                return super().recv_into(buffer, nbytes, flags | _DONTWAIT)
             except BlockingIOError:
-                self._run(flags)
+                self._turn(flags)
 
-    def _run(self, flags: int) -> None:
-        if flags & socket.MSG_DONTWAIT:
+    def _turn(self, flags: int) -> None:
+        if flags & _DONTWAIT:
             raise BlockingIOError
         for hub in self.hubs:
             hub.turn(0.0)
 
 
-class LocalSimulator(RobotSimulator):
-    """A simulator in this process, ready from the beginning."""
+class LocalSimulator:
+    """A simulator of `robot` in lockstep in this process, and the folder for its files.
 
-    local = True
-    board = None
+    `plant` is the simulator's plant file. The true motion is logged to `truth_log`, by default a
+    file in the folder. `scanner` is the file in which a simulated external scanner logs the poses
+    that it measures, `camera` the socket of a simulated camera on the platform. Frames are logged
+    as by `OwnSimulator`. Raises BadInputError.
+    """
 
-    def __init__(self, robot: Robot, plant: Path | None) -> None:
-        self._temporary = TemporaryDirectory(prefix="cdpr-campaign-")
-        self.folder = Path(self._temporary.name)
-        self.truth_log: Path = self.folder / "truth.log"
-        self.bus = f"simbus:campaign-{os.getpid()}-{next(_numbers)}"
+    def __init__(
+        self,
+        robot: Robot,
+        plant: Path | None,
+        truth_log: Path | None = None,
+        scanner: Path | None = None,
+        camera: Path | None = None,
+    ) -> None:
         self._stack = ExitStack()
+        temporary = self._stack.enter_context(TemporaryDirectory(prefix="cdpr-simulator-"))
+        self.folder = Path(temporary)
+        """Folder for temporary files, removed at the end."""
+        self.truth_log: Path = truth_log or self.folder / "truth.log"
+        """The log of the true motion."""
+        self.board = None if robot.tension_sensors is None else self.folder / "board"
+        """The physics board of a robot with load cells."""
+        self.bus = f"simbus:local-{os.getpid()}-{next(_numbers)}"
         self._ends: list[tuple[socket.socket, socket.socket]] = []
         """Both ends of each connection."""
-        body, plants = physics_of(robot, plant, detached=False)
-        assert body is not None  # campaigns are for robots with a platform
-        drives = [
-            SimDrive.for_winch(axis.winch, one, serial=serial, robot=member)
-            for serial, (axis, one, member) in enumerate(
-                zip(robot.axes, plants, body.members(), strict=True), 1
-            )
-        ]
-        drives[0].record_with(PoseLog(self.truth_log, body))
-        self._first_drive = drives[0]
         self.hubs: list[Hub] = []
+        try:
+            self._open(robot, plant, scanner, camera)
+        except BaseException:
+            self.stop()
+            raise
+
+    def _open(
+        self, robot: Robot, plant: Path | None, scanner: Path | None, camera: Path | None
+    ) -> None:
+        drives = simulated_drives(
+            *(self._stack, robot, plant), truth_log=self.truth_log, scanner=scanner,
+            board=self.board, camera=camera,
+        )  # fmt: skip
+        self._first_drive = drives[0]
+        log = frame_log_at(next_frame_log())
         urls = robot_urls(robot, [self.bus])
         for bus in robot.buses:
-            name, nodes = urls[bus.name].channel, [drives[i] for i in robot.axes_on(bus.name)]
-            hub = Hub(nodes, mode=ClockMode.LOCKSTEP, bitrate=bus.bitrate_bit_s, name=name)
+            nodes = with_frame_log([drives[i] for i in robot.axes_on(bus.name)], log, bus.name)
+            name = urls[bus.name].channel
+            # nothing is gained by computing ahead: the loop waits for it
+            hub = Hub(nodes, bitrate=bus.bitrate_bit_s, name=name, ahead=False)
             in_this_process[name] = self._connector(hub)
             self._stack.callback(in_this_process.pop, name)
             self._stack.callback(hub.close)
@@ -103,16 +123,44 @@ class LocalSimulator(RobotSimulator):
             hub.robot_hubs, hub.buses_before = self.hubs, self.hubs[:number]
         FaultBench(drives).connect(self.hubs)
 
-    @override
-    def await_ready(self) -> str:
-        return ""
-
     @property
     def sync_count(self) -> int:
         """Number of SYNCs so far, as in the log of the truth."""
         return self._first_drive.sync_count
 
-    @override
+    def stop(self) -> None:
+        """End the simulator, and remove its folder."""
+        self._stack.close()
+
+    # -- requests beside the buses
+
+    def inject(
+        self,
+        fault: str,
+        axis: int | None = None,
+        value: float | None = None,
+        at_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Inject a fault at bus time `at_s`, by default now; return the order with its values.
+
+        `cdpr_sim_bus.cia402.faults` lists the faults; "mend" ends those of an axis, or all. Axes
+        count from 1. The value 0 mends only this fault. Bus time is `truth()["time_s"]`, and the
+        time of a clock that leads the bus. Raises BadInputError for an invalid order.
+        """
+        order = {"fault": fault, "axis": axis, "value": value, "at_s": at_s}
+        return dict(self._ask("fault", order))
+
+    def broken(self) -> list[dict[str, Any]]:
+        """Return what is broken now: `fault`, `axis`, `value`."""
+        return list(self._ask("broken"))
+
+    def truth(self) -> dict[str, Any]:
+        """Return the truth now, for a judge: `time_s`, `drives`, `platform`, `faults`.
+
+        It needs no running loop. Each of `faults` has `fault`, `axis`, `value`, `at_s`, `ended_s`.
+        """
+        return dict(self._ask("truth"))
+
     def _ask(self, key: str, value: Any = True) -> Any:
         for hub in self.hubs:
             hub.turn(0.0)
@@ -120,11 +168,6 @@ class LocalSimulator(RobotSimulator):
             return self.hubs[0].requests[key](value)
         except RequestError as error:
             raise BadInputError(str(error)) from error
-
-    @override
-    def stop(self) -> None:
-        self._stack.close()
-        self._temporary.cleanup()
 
     def _connector(self, hub: Hub) -> Callable[[], socket.socket]:
         def connect() -> socket.socket:
