@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
@@ -41,11 +40,12 @@ from cdpr_rt.service import stream_packet
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.rows import cycle_figures
 from cdpr_rt.service.setpoint_stream import Address, StreamSessionManager
+from cdpr_tools.client.handle_errors import errors_for_scripts
 from cdpr_tools.composition.local_simulator import LocalSimulator
 from cdpr_tools.composition.loop_parts import control_loop, loop_parts
 from cdpr_tools.composition.own_code import OwnCode
 from cdpr_tools.composition.simulator import OwnLoadCells
-from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.errors import BadInputError
 from cdpr_tools.recordings.truth import POSES, RecordLog
 
 if TYPE_CHECKING:
@@ -608,13 +608,8 @@ class LockstepRobot:
     @contextmanager
     def _for_script(self) -> Iterator[None]:
         self._require_open()
-        try:
-            with _interrupts_deferred():
-                yield
-        except BadInputError as error:
-            raise InvalidArgument(str(error)) from None
-        except (CommandError, DriverError, ControlError) as error:
-            raise Error(str(error)) from None
+        with errors_for_scripts(), _interrupts_deferred():
+            yield
 
 
 @contextmanager

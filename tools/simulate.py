@@ -6,13 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from cdpr_drivers.errors import DriverError
-from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import NO_PLATFORM
-from cdpr_rt.code_loader import CodeError
-from cdpr_rt.errors import ControlError
-from cdpr_rt.robot import Error, InvalidArgument, InvalidRobot, Robot, path_of
-from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_rt.robot import InvalidArgument, Robot, path_of
 from cdpr_tools.loading import without_collection
 
 if TYPE_CHECKING:
@@ -45,16 +40,17 @@ def simulate(
     plant_file = None if plant is None else path_of("plant", plant)
     if plant_file is not None and not plant_file.is_file():
         raise InvalidArgument(f"plant: {plant_file}: no such file")
-    try:
-        with without_collection():
-            # imported here, because collection of garbage would take a tenth of the time
-            from cdpr_rt.model.own_distribution import (  # noqa: PLC0415
-                checked_distribution,
-                require_code_allowed,
-            )
-            from cdpr_tools.composition.own_code import OwnCode  # noqa: PLC0415
-            from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
+    with without_collection():
+        # imported here, because collection of garbage would take a tenth of the time
+        from cdpr_rt.model.own_distribution import (  # noqa: PLC0415
+            checked_distribution,
+            require_code_allowed,
+        )
+        from cdpr_tools.client.handle_errors import errors_for_scripts  # noqa: PLC0415
+        from cdpr_tools.composition.own_code import OwnCode  # noqa: PLC0415
+        from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
 
+        with errors_for_scripts(opening=True):
             _require_objects(controller, programs)
             if tension_distribution is not None:
                 checked_distribution("tension_distribution", tension_distribution)
@@ -67,12 +63,6 @@ def simulate(
             if allow_code:
                 require_code_allowed(made.robot, allow_code=True)
             return Robot(made.__enter__())
-    except (ProfileError, BadInputError) as error:
-        raise InvalidRobot(str(error)) from None
-    except CodeError as error:
-        raise InvalidArgument(str(error)) from None
-    except (CommandError, DriverError, ControlError) as error:
-        raise Error(str(error)) from None
 
 
 def _require_objects(controller: object, programs: object) -> None:

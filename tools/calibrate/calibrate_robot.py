@@ -18,7 +18,7 @@ from cdpr_tools.calibrate.finish import concluded, stop_criterion
 from cdpr_tools.calibrate.measure_poses import DATA, PoseOperator, StoredPoses
 from cdpr_tools.calibrate.places import MOST_POSES, places_of, poses_wanted
 from cdpr_tools.calibrate.run import POINTS, Ask, read_places
-from cdpr_tools.errors import errors_for_scripts
+from cdpr_tools.client.handle_errors import errors_for_scripts
 from cdpr_tools.output import Output
 
 Measure = Callable[[FloatArray], ArrayLike | None]

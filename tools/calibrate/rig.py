@@ -21,7 +21,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.robot import Error, Robot
 from cdpr_tools.calibrate.measure_poses import PoseOperator, Readings, TakeImage, TargetNotReached
-from cdpr_tools.client.daemon_robot import robot_errors
+from cdpr_tools.client.handle_errors import robot_errors
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.recordings.truth import SCANNER, RecordLog
 

@@ -38,23 +38,18 @@ from cdpr_rt.robot import (
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSession
 from cdpr_tools.client.client import (
-    ConnectionLostError,
-    CrowdedError,
     Daemon,
-    LoopEndedError,
     NoDaemonError,
-    ServiceRefusalError,
-    UnansweredError,
     answers,
     await_start,
     is_starting,
     open_daemon,
 )
 from cdpr_tools.client.daemon_end import end_daemon
-from cdpr_tools.client.refusals import DaemonRefusalError
+from cdpr_tools.client.handle_errors import errors_for_scripts, robot_errors
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.composition.fault_injection import fault_access
-from cdpr_tools.errors import BAD_INPUT, BadInputError, CommandError, WorkFailedError
+from cdpr_tools.errors import BAD_INPUT, CommandError
 from cdpr_tools.output import Output
 from cdpr_tools.processes import module_command
 from cdpr_tools.streams import procedure_token
@@ -84,7 +79,7 @@ def connect(robot: str | Path | None = None, *, socket: str | Path | None = None
     thread. Closing the handle releases the right and holds the robot. If the script dies, the right
     expires after 2 s and the motion stops. Raises NotRunning and InvalidRobot.
     """
-    with ExitStack() as stack, _errors_of_opening():
+    with ExitStack() as stack, errors_for_scripts(opening=True):
         name = None if robot is None else str(robot)
         unix = None if socket is None else path_of("socket", socket)
         try:
@@ -125,7 +120,7 @@ def run(
     """
     _require_no_daemon(str(robot))
     buses = texts_of("bus", bus or ())
-    with _errors_of_opening():
+    with errors_for_scripts(opening=True):
         profile = load_robot(robot)
         try:
             real = real_buses(profile, buses)
@@ -149,7 +144,7 @@ def run(
         word for program in texts_of("programs", programs) for word in ("--program", program)
     ]
     options += ["--allow-code"] * allow_code
-    with ExitStack() as stack, _errors_of_opening():
+    with ExitStack() as stack, errors_for_scripts(opening=True):
         try:
             process = _DaemonProcess([str(robot), *options, *["--yes"] * yes])
         except Error:
@@ -189,62 +184,6 @@ def commanded(daemon: Daemon, *, in_control: bool = False) -> Iterator[Robot]:
             if in_control:
                 backend.close()
             backend.release()
-
-
-@contextmanager
-def robot_errors() -> Iterator[None]:
-    """Raise errors of a robot's handle in the block as errors of the command."""
-    try:
-        yield
-    except Error as error:
-        raise command_error(error) from None
-
-
-def command_error(error: Error) -> CommandError:
-    """Return the command's error for an error of the handle: the CommandError behind it, if any."""
-    cause = error.origin
-    if not isinstance(cause, CommandError):
-        bad = isinstance(error, InvalidArgument)
-        cause = (BadInputError if bad else WorkFailedError)(str(error))
-    for note in getattr(error, "__notes__", ()):
-        cause.add_note(note)
-    return cause
-
-
-def _error_for_script(error: CommandError | ProfileError) -> Error:
-    """Return the error of a handle for an error of its daemon."""
-    made: Error
-    match error:
-        case CrowdedError():
-            made = Error(str(error))
-        case ConnectionLostError() | UnansweredError():
-            made = Error(f"{error}; the command may still be carried out")
-        case NoDaemonError() | LoopEndedError():
-            made = NotRunning(str(error))
-        case DaemonRefusalError():
-            made = Refused(str(error), error.refusal)
-        case ServiceRefusalError():
-            made = Refused(str(error))
-        case BadInputError():
-            made = InvalidArgument(str(error))
-        case ProfileError():
-            made = InvalidRobot(str(error))
-        case _:
-            made = Error(str(error))
-    made.origin = error
-    return made
-
-
-@contextmanager
-def _errors_of_opening() -> Iterator[None]:
-    try:
-        yield
-    except NoDaemonError as error:
-        raise NotRunning(str(error)) from None
-    except (ProfileError, BadInputError, DriverError) as error:
-        raise InvalidRobot(str(error)) from None
-    except CommandError as error:
-        raise Error(str(error)) from None
 
 
 class _Remote:
@@ -308,10 +247,8 @@ class _Remote:
     def _errors(self) -> Iterator[None]:
         if self._closed.is_set():
             raise NotRunning("the handle is closed")
-        try:
+        with errors_for_scripts():
             yield
-        except (CommandError, ProfileError) as error:
-            raise _error_for_script(error) from None
 
     def brief_status(self) -> dict[str, Any]:
         """See `Backend.brief_status`."""

@@ -14,6 +14,7 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_profiles import Winch, load_winch
 from cdpr_rt.identification.commissioning_results import Paths, assemble, identify
 from cdpr_rt.robot import Error, InvalidArgument, number_in, path_of
+from cdpr_tools.client.handle_errors import errors_for_scripts
 from cdpr_tools.commission import summary
 from cdpr_tools.commission.commissioning import (
     DEFAULT_BANDWIDTH_HZ,
@@ -24,7 +25,7 @@ from cdpr_tools.commission.commissioning import (
     Plan,
 )
 from cdpr_tools.composition.session import open_bus, open_winch
-from cdpr_tools.errors import BadInputError, WorkFailedError, errors_for_scripts, os_error_as
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.raw_data import discard_raw_data, keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle

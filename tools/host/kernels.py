@@ -133,7 +133,7 @@ def _identification() -> None:
 def _buses() -> None:
     """Boot robots on one and two simulated buses: frames, truth log, rows."""
     # they need the daemon's extra
-    from cdpr_tools.client.daemon_robot import robot_errors  # noqa: PLC0415
+    from cdpr_tools.client.handle_errors import robot_errors  # noqa: PLC0415
     from cdpr_tools.lockstep_robot import LockstepRobot  # noqa: PLC0415
 
     for name in ("bench-2", "bench-8", "planar-3"):

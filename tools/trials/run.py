@@ -13,7 +13,7 @@ import numpy as np
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robot import Error, Refused
-from cdpr_tools.client.daemon_robot import robot_errors
+from cdpr_tools.client.handle_errors import robot_errors
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.lockstep_robot import LockstepRobot
 from cdpr_tools.trials.directions import Directions, platform_of
