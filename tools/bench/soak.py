@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,19 +35,19 @@ _PHASE = 0.25
 
 @dataclass(frozen=True)
 class Process:
-    """Resources that one process holds at one moment."""
+    """Resources that this process, with master and simulator, holds at one moment."""
 
     memory_KiB: int
     """Private memory of the process, swapped out or not, without file-backed pages."""
     open_files: int
 
     @classmethod
-    def of(cls, pid: int) -> Process:
-        """Return the resources of a process of this machine."""
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    def now(cls) -> Process:
+        """Return the present resources."""
+        lines = Path("/proc/self/status").read_text().splitlines()
         status = dict(line.split(":", 1) for line in lines)
         memory = sum(int(status[key].split()[0]) for key in ("RssAnon", "RssShmem", "VmSwap"))
-        return cls(memory, sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir()))
+        return cls(memory, sum(1 for _ in Path("/proc/self/fd").iterdir()))
 
 
 def bus_counts(session: Session) -> dict[str, dict[str, Any]]:
@@ -114,15 +113,11 @@ def growth(samples: Sequence[Process]) -> Process:
 
 
 class Soak:
-    """Moves an enabled robot back and forth for hours, and samples both processes meanwhile."""
+    """Moves an enabled robot back and forth for hours, and samples its process meanwhile."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
-        pids = {"master": os.getpid()}
-        if session.simulator_pid is not None:
-            pids["simulator"] = session.simulator_pid
-        self._pids = pids
-        self.samples: dict[str, list[Process]] = {name: [] for name in pids}
+        self.samples: list[Process] = []
         device = session.device
         motors = [axis.winch.motor for axis in session.robot.axes]
         frequency = _PHASE / (1.5 * device.period_s)
@@ -164,49 +159,39 @@ class Soak:
         self._speed = -self._speed
 
     def _sample(self) -> None:
-        for name, pid in self._pids.items():
-            self.samples[name].append(Process.of(pid))
+        self.samples.append(Process.now())
 
     def figures(self, title: str) -> Figures:
-        """Return the results: a row for each bus and for each process."""
+        """Return the results: a row for each bus."""
         after = bus_counts(self.session)
         buses = {
             name: compare(name, self.session, before, after[name])
             for name, before in self._before.items()
         }
-        grown = {name: growth(samples) for name, samples in self.samples.items()}
+        grown = growth(self.samples)
         lost = sum(bus["lost"] for bus in buses.values())
-        leaks = [
-            name
-            for name, gain in grown.items()
-            if gain.memory_KiB > MEMORY_LIMIT_KiB or gain.open_files > 0
-        ]
         cycles = round(self.bus_s / self.session.device.period_s)
         failed = [f"{lost} frames were lost"] if lost else []
-        failed += [
-            f"the {name} uses {gain.memory_KiB} KiB more memory and {gain.open_files} more "
-            "open files"
-            for name, gain in grown.items()
-            if name in leaks
-        ]
+        if grown.memory_KiB > MEMORY_LIMIT_KiB or grown.open_files > 0:
+            failed.append(
+                f"{grown.memory_KiB} KiB more memory and {grown.open_files} more open files in use"
+            )
         return Figures(
             f"{title}: {self.bus_s / _HOUR_S:.3f} h of bus time, {cycles} cycles, in "
             f"{self.wall_s:.0f} s ({1e6 * self.wall_s / max(1, cycles):.0f} us each)",
             {f"bus {name}": {k: v for k, v in bus.items() if k != "bus"}
              for name, bus in buses.items()},
             notes=[
-                f"{name}: {self.samples[name][-1].memory_KiB / 1024:.0f} MiB, grown by "
-                f"{gain.memory_KiB} KiB; open files grown by {gain.open_files}"
-                for name, gain in grown.items()
+                f"{self.samples[-1].memory_KiB / 1024:.0f} MiB, grown by {grown.memory_KiB} KiB; "
+                f"open files grown by {grown.open_files}"
             ],
             more={
                 "bus_hours": self.bus_s / _HOUR_S,
                 "wall_s": round(self.wall_s, 1),
                 "cycles": cycles,
-                "memory_growth_KiB": {name: gain.memory_KiB for name, gain in grown.items()},
-                "open_files_growth": {name: gain.open_files for name, gain in grown.items()},
+                "memory_growth_KiB": grown.memory_KiB,
+                "open_files_growth": grown.open_files,
                 "lost_frames": lost,
-                "leaks": leaks,
             },
             error="; ".join(failed),
         )  # fmt: skip
@@ -215,7 +200,7 @@ class Soak:
 def measure(
     robot: Robot, hours: float, most_wall_s: float, rate_Hz: float | None, out: Output
 ) -> Figures:
-    """Run `robot` on a separate simulator for `hours` of bus time; return the figures.
+    """Run `robot` on simulated drives for `hours` of bus time; return the figures.
 
     The run ends earlier when `most_wall_s` have passed. `rate_Hz` replaces the robot's cycle rate:
     at a lower rate, more bus time passes with the same number of frames. Raises WorkFailedError if

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -16,13 +15,11 @@ from cdpr_drivers.robot.commissioned import folder_of
 from cdpr_drivers.robot.robot_buses import require_fit, robot_urls, starts_own_simulator
 from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_rt.identification.commissioning_results import Paths
-from cdpr_rt.loop.realtime import one_core
 from cdpr_tools.commands import options
 from cdpr_tools.commands.options import option
 from cdpr_tools.commission.commissioning import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Index
 from cdpr_tools.commission.run import Request, commission_winch, prepare
-from cdpr_tools.composition.session import confirm_motion, open_bus
-from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.composition.session import confirm_motion, open_bus, simulator_of
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 
@@ -86,12 +83,8 @@ def _detached_motors(
     require_fit(robot)
     with ExitStack() as stack:
         if starts_own_simulator(buses):
-            name = f"simbus:own-{os.getpid()}"
             out.note(f"starting simulated drives without cables: {len(robot.axes)} ...")
-            simulator = OwnSimulator(robot.reference, name, plant, detached=True)
-            stack.callback(simulator.stop)
-            stack.enter_context(one_core(simulator.process.pid))
-            buses = [name]
+            buses = [simulator_of(stack, robot, plant, detached=True)]
         elif plant is not None:
             raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
         urls = robot_urls(robot, buses)

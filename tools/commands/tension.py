@@ -295,7 +295,7 @@ def _bus_and_hanging(
         if plant is None:
             plant = place / "plant.toml"
             plant.write_text(_MASS_PLANT)
-    url, _ = find_bus(stack, winch.profile, url, winch.out, plant, board=board)
+    url = find_bus(stack, winch.profile, url, winch.out, plant, board=board)
     return url, by_prompt if board is None else on_board(board)
 
 

@@ -70,8 +70,9 @@ class LocalSimulator:
 
     `plant` is the simulator's plant file. The true motion is logged to `truth_log`, by default a
     file in the folder. `scanner` is the file in which a simulated external scanner logs the poses
-    that it measures, `camera` the socket of a simulated camera on the platform. Frames are logged
-    as by `OwnSimulator`. Raises BadInputError.
+    that it measures, `camera` the socket of a simulated camera on the platform. `board` is the
+    file of a physics board to create; a robot with load cells has one anyway. If `detached`, the
+    motors have no cables. Frames are logged as by `OwnSimulator`. Raises BadInputError.
     """
 
     def __init__(
@@ -81,6 +82,8 @@ class LocalSimulator:
         truth_log: Path | None = None,
         scanner: Path | None = None,
         camera: Path | None = None,
+        board: Path | None = None,
+        detached: bool = False,
     ) -> None:
         self._stack = ExitStack()
         temporary = self._stack.enter_context(TemporaryDirectory(prefix="cdpr-simulator-"))
@@ -88,24 +91,31 @@ class LocalSimulator:
         """Folder for temporary files, removed at the end."""
         self.truth_log: Path = truth_log or self.folder / "truth.log"
         """The log of the true motion."""
-        self.board = None if robot.tension_sensors is None else self.folder / "board"
-        """The physics board of a robot with load cells."""
+        if board is None and robot.tension_sensors is not None:
+            board = self.folder / "board"
+        self.board = board
+        """The physics board, which load cells need."""
         self.bus = f"simbus:local-{os.getpid()}-{next(_numbers)}"
         self._ends: list[tuple[socket.socket, socket.socket]] = []
         """Both ends of each connection."""
         self.hubs: list[Hub] = []
         try:
-            self._open(robot, plant, scanner, camera)
+            self._open(robot, plant, scanner, camera, detached)
         except BaseException:
             self.stop()
             raise
 
     def _open(
-        self, robot: Robot, plant: Path | None, scanner: Path | None, camera: Path | None
+        self,
+        robot: Robot,
+        plant: Path | None,
+        scanner: Path | None,
+        camera: Path | None,
+        detached: bool,
     ) -> None:
         drives = simulated_drives(
-            *(self._stack, robot, plant), truth_log=self.truth_log, scanner=scanner,
-            board=self.board, camera=camera,
+            *(self._stack, robot, plant), detached=detached, truth_log=self.truth_log,
+            scanner=scanner, board=self.board, camera=camera,
         )  # fmt: skip
         self._first_drive = drives[0]
         log = frame_log_at(next_frame_log())

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,7 +26,7 @@ from cdpr_drivers.robot.commissioned import identity_of
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import require_fit, starts_own_simulator
 from cdpr_drivers.robot.safety import CLOSED
-from cdpr_profiles import Robot, Winch
+from cdpr_profiles import Robot, Winch, load_winch
 from cdpr_profiles.eds import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_profiles.robot_limits import Limit
@@ -45,13 +44,13 @@ from cdpr_rt.loop.engine import HOLD, IDLE, LoopParts
 from cdpr_rt.loop.loop import ControlLoop
 from cdpr_rt.loop.machine import MachineError
 from cdpr_rt.loop.operating import Operator, Tolerance
-from cdpr_rt.loop.realtime import one_core, paced_realtime
+from cdpr_rt.loop.realtime import paced_realtime
 from cdpr_rt.loop.warm_up import warm_up
 from cdpr_rt.model.robot_arrays import RATED_SPEED_SHARE, limits_of
 from cdpr_rt.programs.idle import ZeroTorqueProgram
 from cdpr_rt.programs.track import TrackProgram
+from cdpr_tools.composition.local_simulator import LocalSimulator
 from cdpr_tools.composition.loop_parts import control_loop
-from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError, raised_as
 from cdpr_tools.output import Output
@@ -122,8 +121,6 @@ class Session(Operator):
         self.machine = machine
         self.boot_s = 0.0
         """Bus time from the first frame until the last drive is operational."""
-        self.simulator_pid: int | None = None
-        """Process id of the simulator that the command started."""
 
     @property
     def device(self) -> AxisBuses:
@@ -322,7 +319,7 @@ def open_network(
     """
     require_fit(winch)
     with ExitStack() as stack:
-        bus, _ = find_bus(stack, winch, url, out, plant)
+        bus = find_bus(stack, winch, url, out, plant)
         clock = open_clock([bus])
         stack.callback(clock.close)
         heartbeat_s = _heartbeat_s(winch)
@@ -357,14 +354,13 @@ def open_winch(
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
         robot = robot_of_winch(winch)
-        bus, pid = find_bus(stack, winch, url, out, plant, truth_log, _compiled(robot))
+        bus = find_bus(stack, winch, url, out, plant, truth_log)
         axis = replace(robot.axes[0], winch=winch)  # the drive waits as long as its profile says
         robot = replace(robot, axes=(axis,), master_heartbeat_s=_heartbeat_s(winch))
         session = stack.enter_context(
             booted(robot, [str(bus)], stop_requested, safety_io, watching, tolerance)
         )
         stack.callback(stop_requested.closing)  # before the power is cut
-        session.simulator_pid = pid
         _prepare(session, stop_requested, out, reset)
         yield session
 
@@ -386,13 +382,11 @@ def open_robot(
     require_fit(robot)
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
-        pid = None
         if starts_own_simulator(buses):
             out.note(f"starting simulated drives: {len(robot.axes)} ...")
-            buses, pid = _own_simulator(stack, robot.reference, meanwhile=_compiled(robot))
+            buses = [simulator_of(stack, robot)]
         session = stack.enter_context(booted(robot, buses, stop_requested, safety_io))
         stack.callback(stop_requested.closing)  # before the power is cut
-        session.simulator_pid = pid
         _prepare(session, stop_requested, out, reset)
         yield session
 
@@ -407,11 +401,6 @@ def _prepare(session: Session, stop_requested: StopRequest, out: Output, reset: 
         out.note(f"{session.machine.safety}: {CLOSED}")
 
 
-def _compiled(robot: Robot) -> Callable[[], None]:
-    """Return a function that compiles the master's cycle while a simulator compiles physics."""
-    return partial(warm_up, len(robot.axes), robot.sync_period_s)
-
-
 def _heartbeat_s(winch: Winch) -> float:
     """Return a period of the master's heartbeat that the drive tolerates."""
     return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
@@ -424,32 +413,28 @@ def find_bus(
     out: Output,
     plant: Path | None,
     truth_log: Path | None = None,
-    meanwhile: Callable[[], None] | None = None,
     board: Path | None = None,
-) -> tuple[BusUrl, int | None]:
-    """Return the winch's bus, and the process of its simulator if one was started.
-
-    `meanwhile` is called while the simulator starts.
-    """
+) -> BusUrl:
+    """Return the winch's bus; `simbus:` without a name starts a simulator."""
     if url.starts_own_simulator:
         out.note("starting the simulated drive ...")
-        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log, meanwhile, board)
-        return open_bus(bus), pid
+        robot = robot_of_winch(load_winch(winch.reference))  # as in its file
+        return open_bus(simulator_of(stack, robot, plant, truth_log, board))
     if plant is not None:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-    return url, None
+    return url
 
 
-def _own_simulator(
+def simulator_of(
     stack: ExitStack,
-    reference: str,
+    robot: Robot,
     plant: Path | None = None,
     truth_log: Path | None = None,
-    meanwhile: Callable[[], None] | None = None,
     board: Path | None = None,
-) -> tuple[list[str], int]:
-    bus = f"simbus:own-{os.getpid()}"
-    simulator = OwnSimulator(reference, bus, plant, truth_log, board=board, meanwhile=meanwhile)
+    *,
+    detached: bool = False,
+) -> str:
+    """Start a simulator of `robot` that `stack` stops; return its bus."""
+    simulator = LocalSimulator(robot, plant, truth_log, board=board, detached=detached)
     stack.callback(simulator.stop)
-    stack.enter_context(one_core(simulator.process.pid))
-    return [bus], simulator.process.pid
+    return simulator.bus

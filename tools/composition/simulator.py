@@ -114,22 +114,15 @@ class OwnSimulator(_OwnProcess):
         plant: Path | None = None,
         truth_log: Path | None = None,
         nodes: int = 1,
-        board: Path | None = None,
         paced: bool = False,
-        detached: bool = False,
-        scanner: Path | None = None,
         camera: Path | None = None,
         meanwhile: Callable[[], None] | None = None,
     ) -> None:
         command = ["sim", "up", winch, "--bus", bus, "--paced" if paced else "--lockstep"]
         command += ["--nodes", str(nodes)]
-        if detached:
-            command.append("--detached")
         for option, path in (
             ("--plant", plant),
             ("--truth-log", truth_log),
-            ("--scanner", scanner),
-            ("--board", board),
             ("--camera", camera),
             ("--frame-log", next_frame_log()),
         ):

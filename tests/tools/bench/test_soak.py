@@ -36,7 +36,7 @@ def test_a_short_soak_finds_no_leak_and_no_loss():
         cwd=ROOT,
     )
     told = json.loads(done.stdout.splitlines()[-1])
-    assert (done.returncode, told["ok"], told["leaks"]) == (0, True, []), told
+    assert (done.returncode, told["ok"]) == (0, True), told
     assert told["bus_hours"] == pytest.approx(0.003, rel=1e-3)
     assert told["cycles"] >= 2_700
     assert told["lost_frames"] == 0
@@ -56,7 +56,6 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session
     name = simulator.ready["buses"]["a"]["bus"].removesuffix("-a")
     try:
         with open_robot(load_robot(path), [name], OUT) as opened:
-            opened.simulator_pid = simulator.process.pid
             opened.enable()
             yield opened
             opened.disable()
@@ -82,9 +81,9 @@ def test_leaked_memory_and_files_are_found(session: Session):
     figures = soaked(session, 6.0, leak)
     for descriptor in files:
         os.close(descriptor)
-    assert figures.error and figures.more["leaks"] == ["master"]
-    assert figures.more["memory_growth_KiB"]["master"] > soak_bench.MEMORY_LIMIT_KiB
-    assert figures.more["open_files_growth"] == {"master": 2, "simulator": 0}
+    assert "more memory and 2 more open files" in figures.error
+    assert figures.more["memory_growth_KiB"] > soak_bench.MEMORY_LIMIT_KiB
+    assert figures.more["open_files_growth"] == 2
 
 
 def test_lost_commands_are_found(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
