@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any, Final
 
 from cdpr_rt.robot import Error
@@ -37,6 +36,7 @@ DID_NOT_START: Final = "did not start"
 _OUTPUT: Final = "output.txt"
 _AT_MOST: Final = 4000
 _INTERRUPTED: Final = 130
+_ENDS: Final = (signal.SIGTERM, signal.SIGINT)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,6 @@ class _Server:
         return [_result(one) for one in json.loads(line)]
 
 
-_LATER_S: Final = 0.01
 _servers: list[_Server] = []
 
 
@@ -92,30 +91,37 @@ def _serve() -> None:
     _end_with(os.getppid())
     out = os.dup(1)
     os.dup2(2, 1)  # nothing but results may go to the caller
-    with suppress(KeyboardInterrupt):
-        for line in sys.stdin:
-            given = [Scenario(**one) for one in json.loads(line)]
-            found = run_scenarios(given)
-            os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
-    for number in (signal.SIGTERM, signal.SIGINT):  # would interrupt the end of the interpreter
-        signal.signal(number, signal.SIG_IGN)
+    for line in sys.stdin:
+        found = run_scenarios([Scenario(**one) for one in json.loads(line)])
+        os.write(out, json.dumps([asdict(one) for one in found]).encode() + b"\n")
 
 
-def _interrupt_once(_: int, frame: FrameType | None) -> None:
-    while frame is not None:
-        if frame.f_code.co_name == "__del__":  # an exception there would be lost
-            signal.setitimer(signal.ITIMER_REAL, _LATER_S)
-            return
-        frame = frame.f_back
-    for number in (signal.SIGTERM, signal.SIGINT):  # a second one would interrupt the end
+_forks: list[int] = []
+"""Forks of this process that still run."""
+_folders: list[Path] = []
+"""Temporary folders of this process."""
+
+
+def _end(*_: object) -> None:
+    """End this process after its forks, and remove its files.
+
+    Nothing is raised: a destructor that runs just now would swallow the exception.
+    """
+    for number in _ENDS:
         signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
+    for pid in _forks:
+        with suppress(OSError):  # it has ended just now
+            os.kill(pid, signal.SIGTERM)
+            os.waitpid(pid, 0)
+    for folder in _folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    os._exit(_INTERRUPTED)
 
 
 def _end_with(parent: int) -> None:
-    """End when the parent ends, as after an interrupt, so that temporary files are removed."""
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGALRM):
-        signal.signal(number, _interrupt_once)
+    """End when interrupted, and when the parent ends."""
+    for number in _ENDS:
+        signal.signal(number, _end)
     end_with_launcher(parent)
 
 
@@ -145,6 +151,8 @@ def run_scenarios(scenarios: Sequence[Scenario]) -> list[Result]:
 def _from_snapshots(scenarios: Sequence[Scenario], out: int) -> None:
     """Bring a robot from start to start, and fork it for each scenario that begins there."""
     folder = Path(tempfile.mkdtemp(prefix="cdpr-campaign-"))
+    _folders.append(folder)
+    tempfile.tempdir = str(folder)
     try:
         start = RobotAtStart(scenarios[0], folder)
         why = ""
@@ -231,6 +239,7 @@ class _Lines:
             os.kill(self._pid, signal.SIGKILL)
         os.close(self._descriptor)
         status = os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+        _forks.remove(self._pid)
         self.end = f"exit status {status}" if ended else f"hung for {self._within_s:g} s"
 
 
@@ -242,16 +251,17 @@ def _in_fork(work: Callable[[int], None], within_s: float) -> _Lines:
     if not pid:
         os.close(inner)
         status = 1
+        _forks.clear()
+        _folders.clear()
         try:
             _end_with(parent)
             work(outer)
             status = 0
-        except KeyboardInterrupt:
-            status = _INTERRUPTED
         except BaseException:
             traceback.print_exc()
         finally:
             os._exit(status)  # without the cleanup of the parent
+    _forks.append(pid)
     os.close(outer)
     return _Lines(pid, inner, within_s)
 

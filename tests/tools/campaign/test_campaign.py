@@ -166,7 +166,7 @@ def test_a_campaign_that_is_ended_leaves_no_processes_and_files(how: int, tmp_pa
         os.killpg(campaign.pid, how) if how == signal.SIGINT else campaign.kill()
         said, _ = campaign.communicate(timeout=60.0)  # until no process has the pipe
     assert "Traceback" not in said
-    assert not list(tmp_path.glob("cdpr-campaign-*"))
+    assert not list(tmp_path.glob("cdpr-*"))
 
 
 def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
