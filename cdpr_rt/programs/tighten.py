@@ -657,7 +657,7 @@ class TightenProgram(PlatformProgram):
             return (
                 f"{self._parts.names[int(self._winches.stuck.argmax())]}: its motor was pushed to "
                 "pay out cable, and its encoder shows no motion: the encoder or the winch is "
-                "stuck; check both before you tighten again"
+                "stuck, or the cable is caught; check them before you tighten again"
             )
         if (noisy := self._winches.noisy).any():
             return (
@@ -671,11 +671,12 @@ class TightenProgram(PlatformProgram):
         allowed_m = self._once_tight_m if self._stage > 0 else _SLACK_m
         if moved_m[i] > allowed_m:
             pull_N = self._winches.tension_N[i]
+            by_hand = "" if self._stage > 0 else "; or it has more slack: take up slack by hand;"
             found = (
                 f"{self._parts.names[i]}: {1e3 * moved_m[i]:.1f} mm reeled in without becoming "
                 f"tight, {1e3 * allowed_m:.1f} mm allowed: its winch turns at {pull_N:.0f} N; its "
-                "cable is broken, unhooked, or wound off its drum, or the platform is not at home: "
-                "put it there"
+                f"cable is broken, unhooked, or wound off its drum{by_hand or ','} or the platform "
+                "is not at home: put it there"
             )
             self._parts.last_stop.broken.setdefault(i, found)
             return found

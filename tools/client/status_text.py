@@ -274,15 +274,17 @@ def next_steps(status: dict[str, Any]) -> list[str]:
     if state in ("unconfigured", "inactive") and status["reason"]:
         return ["next: remove the cause, then `cdpr check`"]
     progress = status.get("program_progress") or {}
+    failed = status["program"] == "tighten" and bool(progress.get("trouble"))
     loose = last and (
         (status["program"] == "hold" and progress.get("tight") is False)
         or (status["program"] == "lower" and progress.get("done") == 1.0)
+        or (failed and progress.get("tight") is False)
     )
     if state not in ("fault", "ready") and not (state == "active" and loose):
         return []
     steps = []
     broken = bool(last and last["broken"])
-    if broken or state == "fault":
+    if broken or failed or state == "fault":
         what = "repair the cable" if broken else "remove the cause"
         injected = is_simulated(status)
         mend = f"; if it was injected: `cdpr sim fault {status['robot']} mend`" if injected else ""

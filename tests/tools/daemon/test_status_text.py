@@ -48,6 +48,10 @@ FALLEN: dict[str, Any] = {"fallen": True, "broken": ["left: broken"]}
 LOOSE: dict[str, Any] = {"program": "hold", "program_progress": {"tight": False}}
 LOWERING: dict[str, Any] = {"program": "lower", "program_progress": {"done": 0.0}}
 SET_DOWN: dict[str, Any] = {"program": "lower", "program_progress": {"done": 1.0}}
+NOT_TIGHTENED: dict[str, Any] = {
+    "program": "tighten",
+    "program_progress": {"tight": False, "trouble": "left: stuck"},
+}
 TIGHT: dict[str, Any] = {"program": "hold", "program_progress": {"tight": True}}
 SIMULATED = {"can0": {"url": "simbus:own-1-can0"}}
 
@@ -136,6 +140,10 @@ def test_cables_under_tension_but_not_tight_are_not_reported_as_loose() -> None:
         ({"state": "active", "last_stop": LOWERED, **TIGHT}, []),
         ({"state": "active", "last_stop": LOWERED, **LOWERING}, []),
         ({"state": "active", "last_stop": LOWERED, **SET_DOWN}, ["`cdpr tighten`"]),
+        (
+            {"state": "active", "last_stop": LOWERED, **NOT_TIGHTENED},
+            ["remove the cause", "`cdpr tighten`"],
+        ),
         (
             {"state": "fault", "last_stop": LOWERED | {"broken": ["left: broken"]}},
             ["repair the cable", "`cdpr ack`, `cdpr enable`, `cdpr tighten --from home`"],
