@@ -190,7 +190,7 @@ def _arguments(rng: random.Random, robot: Robot, name: str) -> dict[str, Any]:
 
 def _faults(rng: random.Random, name: str, robot: Robot, at_s: float) -> Iterator[dict[str, Any]]:
     value: float | None = None
-    if values := DRAWN[name]:
+    if values := _RANGES.get(name):
         value = rng.randint(*values) if isinstance(values[0], int) else rng.uniform(*values)
         if name in _A_KILOGRAM and robot.platform is not None:
             value *= robot.platform.mass_kg
@@ -203,22 +203,19 @@ def _faults(rng: random.Random, name: str, robot: Robot, at_s: float) -> Iterato
 
 _A_KILOGRAM: Final = ("push-x", "push-y", "push-z", "payload")
 """Faults whose values are drawn per kilogram of the platform."""
-DRAWN: Final[dict[str, tuple[Any, Any] | None]] = {
-    "drive-off": None, "drive-reboot": None, "drive-fault": None, "power-lost": None,
-    "pre-operational": None, "nmt-stop": None, "commands-ignored": None,
-    "torque-stuck": None, "torque-bias": (-1.0, 1.0), "torque-limit": (0.05, 2.0),
-    "encoder-jump": (-4000, 4000), "encoder-frozen": None, "encoder-noise": (1.0, 200.0),
-    "index-missed": None,
-    "silence": (1, 400), "bus-off": None, "bus-lost": None, "frames-lost": (1, 8),
-    "frames-lossy": (1.0, 60.0), "frames-doubled": (1, 60), "frames-late": (1, 8),
-    "frames-corrupted": (1, 4), "duplicate-node": None, "no-heartbeat": None,
+_RANGES: Final[dict[str, tuple[Any, Any]]] = {
+    "torque-bias": (-1.0, 1.0), "torque-limit": (0.05, 2.0),
+    "encoder-jump": (-4000, 4000), "encoder-noise": (1.0, 200.0),
+    "silence": (1, 400), "frames-lost": (1, 8), "frames-lossy": (1.0, 60.0),
+    "frames-doubled": (1, 60), "frames-late": (1, 8), "frames-corrupted": (1, 4),
     "heartbeat-late": (50, 1000), "emcy": (0x1000, 0xFFFF), "emcy-flood": (1, 12),
-    "cut-cable": None, "slip": (5, 300), "caught-cable": None,
-    "push-x": (-5.0, 5.0), "push-y": (-5.0, 5.0), "push-z": (-5.0, 5.0),
+    "slip": (5, 300), "push-x": (-5.0, 5.0), "push-y": (-5.0, 5.0), "push-z": (-5.0, 5.0),
     "obstacle": (1.0, 200.0), "payload": (0.05, 1.0),
 }  # fmt: skip
-"""Faults that are drawn, and the range of their values; None for the usual value.
-
-These are all faults of the simulator except those of load cells, brakes and safety I/O, which these
-robots lack.
-"""
+"""Ranges of drawn values; other faults have their usual values."""
+_NOT_DRAWN: Final = ("cell-off", "brake-worn", "brake-stuck", "put-back")
+DRAWN: Final = tuple(
+    name for name, fault in FAULTS.items() if fault.needs != "board" and name not in _NOT_DRAWN
+)
+"""Faults that are drawn: all except those of load cells, brakes and safety I/O, which these robots
+lack."""
