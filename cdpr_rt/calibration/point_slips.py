@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 from typing import Final
 
 import numpy as np
@@ -46,8 +46,6 @@ _SCALE_GAIN: Final = 5.0
 """The same for a slip of the scale alone, which the drums of any robot determine."""
 MARGIN: Final = 9.0
 """Smallest cost by which one explanation must fit better than another."""
-_NOISIER: Final = (1.0, 2.0, 4.0)
-"""Factors on the given standard deviations of points that are tried."""
 _ODD: Final = 1e-3
 """Probability below which points contradict the lengths."""
 _MISFIT: Final = 9.0
@@ -135,14 +133,12 @@ class _Score:
     """Number of coordinates of the points that agree."""
     bad: int
     """Number of points that contradict all others."""
-    costs: tuple[float, ...]
-    """The cost for each of `_NOISIER`."""
     y: FloatArray
     """Differences of the points from the positions by lengths, (M k,)."""
     A: FloatArray
     """Derivatives of these by the parameters, (M k, P)."""
-    W: tuple[FloatArray, ...]
-    """S^-1 for each of `_NOISIER`; 0 for coordinates that are unknown or contradict all others."""
+    W: FloatArray
+    """S^-1; 0 for coordinates that are unknown or contradict all others."""
     free: FloatArray
     """Sizes of the free columns, (c,)."""
 
@@ -229,35 +225,25 @@ class _ByLengths:
                 break
             used[worst * k : (worst + 1) * k] = False
             bad += 1
-            W = _without(W, slice(worst * k, (worst + 1) * k))
-        fixed = _POINT_COST * bad + slip.cost + 2.0 * columns.shape[1]
-        all_W, costs, size_of_all = [W], [float(y @ W @ y) + fixed], _log_size(W, used)
-        for times in _NOISIER[1:]:
-            W = _inverse(common, times**2 * noise, used)
-            all_W.append(W)
-            costs.append(float(y @ W @ y) + fixed + size_of_all - _log_size(W, used))
-        squares = float(y @ all_W[0] @ y)
-        free = columns.T @ all_W[0] @ y
-        return _Score(
-            min(costs), squares, int(used.sum()), bad, tuple(costs), y, A, tuple(all_W), free
-        )
+            W = _inverse(common, noise, used)
+        squares = float(y @ W @ y)
+        cost = squares + _POINT_COST * bad + slip.cost + 2.0 * columns.shape[1]
+        return _Score(cost, squares, int(used.sum()), bad, y, A, W, columns.T @ W @ y)
 
     def found(self, score: _Score) -> FloatArray:
         """Return the parameters (P,) that fit lengths and points best."""
-        return np.asarray(self.values + self.change + self.C @ (score.A.T @ (score.W[0] @ score.y)))
+        return np.asarray(self.values + self.change + self.C @ (score.A.T @ (score.W @ score.y)))
 
     def cost_of_file(self, score: _Score, directions: FloatArray, most: float) -> float:
         """Return the cost if the file has errors `most` in directions (P, c) of parameters."""
         inverse = directions / self.known[:, None] ** 2
         by_points = score.A @ self.C @ inverse
-        costs = []
-        for cost, W in zip(score.costs, score.W, strict=True):
-            first = (self.values + self.change) @ inverse + by_points.T @ W @ score.y
-            # information from the prior and lengths, and from points
-            second = directions.T @ inverse - inverse.T @ self.C @ inverse
-            second = second + by_points.T @ W @ by_points + np.eye(len(first)) / most**2
-            costs.append(cost - float(first @ np.linalg.solve(second, first)))
-        return float(min(costs) + 2.0 * directions.shape[1])
+        first = (self.values + self.change) @ inverse + by_points.T @ score.W @ score.y
+        # information from the prior and lengths, and from points
+        second = directions.T @ inverse - inverse.T @ self.C @ inverse
+        second = second + by_points.T @ score.W @ by_points + np.eye(len(first)) / most**2
+        gain = first @ np.linalg.solve(second, first)
+        return float(score.cost - gain + 2.0 * directions.shape[1])
 
 
 def _inverse(common: FloatArray, noise: FloatArray, used: BoolArray) -> FloatArray:
@@ -266,18 +252,6 @@ def _inverse(common: FloatArray, noise: FloatArray, used: BoolArray) -> FloatArr
     at = np.ix_(used, used)
     W[at] = np.linalg.inv((common + np.diag(noise))[at])
     return W
-
-
-def _without(W: FloatArray, rows: slice) -> FloatArray:
-    """Return the inverse of S without some rows; these become 0."""
-    block = np.linalg.pinv(W[rows, rows], rcond=_ROUNDING, hermitian=True)
-    less = W - W[:, rows] @ block @ W[rows]
-    less[rows] = less[:, rows] = 0.0
-    return np.asarray(less)
-
-
-def _log_size(W: FloatArray, used: BoolArray) -> float:
-    return float(np.linalg.slogdet(W[np.ix_(used, used)])[1])
 
 
 def _worst_row(W: FloatArray, y: FloatArray, k: int) -> tuple[int, float]:
@@ -440,15 +414,19 @@ def _other_orders(points: Points, model: _ByLengths) -> Iterator[_Slip]:
         kept = _renumbered(points, by, start, what == "lines", len(model.place_m))
         if len(kept.pose) < max(2, count - abs(by)):
             continue
-        off = kept.place_m - there[kept.pose]
-        off -= np.nansum(off, axis=0) / np.isfinite(off).sum(axis=0).clip(min=1)
-        squares = np.nansum(off**2, axis=1).clip(max=_FAR_m2)
         first = points.pose[start] + 1 if start else 0
-        shifted.append((float(squares.sum()), f"{what} {by} {first}", kept))
+        shifted.append((_apart_m2(kept, there), f"{what} {by} {first}", kept))
     for _, name, kept in sorted(shifted, key=lambda one: one[0])[:_BEST]:
         lost = _POINT_COST * (count - len(kept.pose))
         yield _Slip(name, kept, lost + 2.0 * math.log(2 * len(_SHIFTS) * count))
-    yield from _exchanged(points, model)
+    yield from _exchanged(points, there)
+
+
+def _apart_m2(points: Points, there_m: FloatArray) -> float:
+    """Return how far the points, moved as a whole, are from positions from lengths (N, k)."""
+    off = points.place_m - there_m[points.pose]
+    off -= np.nansum(off, axis=0) / np.isfinite(off).sum(axis=0).clip(min=1)
+    return float(np.nansum(off**2, axis=1).clip(max=_FAR_m2).sum())
 
 
 def _renumbered(points: Points, by: int, start: int, lines: bool, poses: int) -> Points:
@@ -467,42 +445,22 @@ def _renumbered(points: Points, by: int, start: int, lines: bool, poses: int) ->
     return Points(pose[inside], points.place_m[inside], points.std_m[inside])
 
 
-def _exchanged(points: Points, model: _ByLengths) -> Iterator[_Slip]:
+def _exchanged(points: Points, there_m: FloatArray) -> Iterator[_Slip]:
     """Yield points with two rows exchanged, or two pairs of rows."""
-    count, here, information = len(points.pose), points, np.linalg.inv(model.C)
-    done: list[str] = []
-    for _ in range(2):
+    count, here, name = len(points.pose), points, "rows"
+    for pairs in (1, 2):
         tried = []
-        for i in range(count):
-            for j in range(i + 1, count):
-                pose = here.pose.copy()
-                pose[[i, j]] = pose[[j, i]]
-                other = replace(here, pose=pose)
-                tried.append((_plain_cost(model, information, other), i, j, other))
+        for i, j in combinations(range(count), 2):
+            pose = here.pose.copy()
+            pose[[i, j]] = pose[[j, i]]
+            other = replace(here, pose=pose)
+            exchanged = f"{name} {points.pose[i] + 1} and {points.pose[j] + 1}"
+            tried.append((_apart_m2(other, there_m), exchanged, other))
         tried.sort(key=lambda one: one[0])
-        for _, i, j, other in tried[: _BEST if not done else 1]:
-            pair = f"{points.pose[i] + 1} and {points.pose[j] + 1}"
-            names = [*done, pair]
-            yield _Slip(
-                "rows " + "; ".join(names), other, len(names) * 2.0 * math.log(count**2 / 2)
-            )
-        if not tried:
-            return
-        _, i, j, here = tried[0]
-        done.append(f"{points.pose[i] + 1} and {points.pose[j] + 1}")
-
-
-def _plain_cost(model: _ByLengths, information: FloatArray, points: Points) -> float:
-    """Return y^T S^-1 y with all points, which only C couples (Woodbury)."""
-    known = np.isfinite(points.place_m)
-    A = model.A[points.pose][known]
-    y = (points.place_m - model.place_m[points.pose])[known] - A @ model.change
-    own = np.diagonal(model.own, axis1=1, axis2=2)[points.pose][known]
-    variance = points.std_m[known] ** 2 + own
-    by = A / variance[:, None]
-    pulled = y @ by
-    less = pulled @ np.linalg.solve(information + A.T @ by, pulled)
-    return float((y**2 / variance).sum() - less)
+        for _, exchanged, other in tried[: _BEST if pairs == 1 else 1]:
+            yield _Slip(exchanged, other, pairs * 2.0 * math.log(count**2 / 2))
+        _, name, here = tried[0]
+        name += ";"
 
 
 def row_slip(measured_m: FloatArray, there_m: FloatArray, std_m: float) -> str:
