@@ -337,12 +337,21 @@ class CableRobot:
         p["mobility"] = before["mobility"] - 1.0 / before["mass"] + 1.0 / p["mass"]
 
     def put_back(self) -> None:
-        """Put the platform at rest at its start pose; cables that are too short get slack."""
+        """Put the platform at rest at its start pose.
+
+        Cables that are too short get the initial slack: whoever carries the platform turns their
+        winches, or pulls the cable through a winch that has power.
+        """
         for name in _STATE:
             self.platform[name] = self._at_start[name]
-        start_m = self.motors["cable_start"]
         for i in range(self.n):
-            start_m[i] = max(float(start_m[i]), self._slack_start_m(i))
+            motor = self.motors[i]
+            short_m = self._slack_start_m(i) - float(motor["cable_start"])
+            if short_m > 0.0 and motor["kind"] == servo.OFF:
+                motor["angle"] += short_m / float(motor["cable_gain"])
+                motor["velocity"] = 0.0
+            elif short_m > 0.0:
+                motor["cable_start"] += short_m
 
     def distance_m(self, i: int) -> float:
         """Return the distance of cable `i` from exit to anchor point, over its pulley, m."""

@@ -162,7 +162,15 @@ class Judge:
         if cause.name == "silence":
             tolerated_s = self.limits.missed_cycles * self.robot.sync_period_s
             return 1e-3 * amount > 2.0 * tolerated_s
-        return cause.name == "cut-cable" and pulled > 2.0
+        return cause.name == "cut-cable" and pulled > 2.0 and not self._set_down(cause.at_s, before)
+
+    def _set_down(self, at_s: float, record: int) -> bool:
+        """Return whether a lowered platform stood on its stand, where its cables become slack."""
+        programs = [s["program"] for s in self.played.statuses if s["at_s"] <= at_s]
+        platform = self.robot.platform
+        assert platform is not None  # campaigns are for robots with a platform
+        above_m = self.truth["position_m"][record, self.up] - platform.home_m[self.up]
+        return bool(programs) and programs[-1] == "lower" and bool(above_m < _STANDS_m)
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""
@@ -430,6 +438,7 @@ def _off_m(j: Judge, moves: BoolArray) -> FloatArray:
     return np.where(moves[at] & (at >= 0), np.nan_to_num(off_m, nan=np.inf), 0.0)
 
 
+_STANDS_m: Final = 0.005
 _LENGTHENS: Final = ("slip", "encoder-jump")
 _NOTICED_S: Final = 0.25
 _OFF_m: Final = 0.03

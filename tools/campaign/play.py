@@ -391,7 +391,8 @@ class Player:
     def _row_truth(self, kept: int) -> IntArray:
         """Return the number of the record of the truth at each of the last rows, -1 for none.
 
-        The loop counts its cycles from its start, the log has more records than SYNCs in a stall.
+        The loop counts its cycles from its start, the log has more records than SYNCs in a stall,
+        and fewer SYNCs than cycles while the first drive is off.
         """
         sync_index = self.played.truth["sync_index"]
         records = np.flatnonzero(sync_index != NO_SYNC)
@@ -402,6 +403,7 @@ class Player:
         at = np.searchsorted(sync_index[records], sync)
         found = at < records.size
         found[found] = sync_index[records[at[found]]] == sync[found]
+        found &= sync > np.r_[-np.inf, syncs[:-1]][group]
         return np.where(found, records[np.where(found, at, 0)], -1)
 
 

@@ -153,6 +153,18 @@ def test_a_fallen_platform_is_put_back_at_rest_with_slack_cables() -> None:
     assert robot.tension_N.max() < 1.0
 
 
+def test_winches_without_power_turn_when_the_platform_is_carried_back() -> None:
+    robot = body(pretension_N=0.0, start={"slack_m": 0.05})
+    run(robot, 0.3)
+    motor, start_m = robot.motors[0], robot.motors["cable_start"].copy()
+    motor["kind"] = servo.OFF
+    motor["angle"] -= 1.0 / motor["cable_gain"]  # wound in by 1 m
+    robot.put_back()
+    np.testing.assert_array_equal(robot.motors["cable_start"], start_m)
+    paid_out_m = motor["cable_gain"] * (motor["angle"] - motor["angle_start"])
+    assert start_m[0] + paid_out_m == pytest.approx(robot.distance_m(0) + 0.05)
+
+
 @pytest.mark.parametrize("length_m", [0.05, 0.2, 1.0])
 def test_stiff_short_cables_stay_stable(length_m: float) -> None:
     exits = ((-length_m - 0.075, 1.5433), (length_m + 0.075, 1.5433), (0.0, 1.4134 - length_m))
