@@ -94,8 +94,8 @@ def status_text(status: dict[str, Any]) -> list[Text | str]:
 
 def _lines(status: dict[str, Any]) -> list[Text]:
     state = status["state"]
-    factor = status.get("real_time_factor")
-    lockstep = "lockstep" if factor is None else f"lockstep at {factor:.2f} of real time"
+    factor, slow = status.get("real_time_factor"), slow_text(status)
+    lockstep = "lockstep" if factor is None or slow else f"lockstep at {factor:.2f} of real time"
     how = ["read-only"] * bool(status["read_only"]) + [lockstep] * bool(status["lockstep"])
     first = Text.assemble(
         f"{status['robot']}: ",
@@ -114,7 +114,7 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         )
         if not status["lockstep"]:  # in lockstep, time stands still with the loop
             lines.append(Text(power_text(status), style="red"))
-    if slow := slow_text(status):
+    if slow:
         lines.append(Text(f"{slow}: this machine is busy, or too slow", style="yellow"))
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))

@@ -70,6 +70,8 @@ def fault(
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
     shows = what in (MEND, LIST)
     axes = robot.axes if shows and axis is None else (_axis(robot, axis or "1"),)
+    if value in [one.name for one in robot.axes]:
+        raise BadInputError(f"{what} {value}: choose the axis with: --axis '{value}'")
     urls = robot_urls(robot, bus or _buses_of_daemon(daemon))
     if shows and value is not None:
         raise BadInputError(f"{what} {value}: {what} takes no value")

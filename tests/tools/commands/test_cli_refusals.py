@@ -257,3 +257,8 @@ def test_a_fault_is_injected_on_buses_of_simulated_drives_only() -> None:
     bus = ("--bus", "socketcan:can0")
     message = refused(2, "sim", "fault", WINCH, "cut-cable", *bus)
     assert "socketcan:can0: allowed: a simulated bus" in message
+
+
+def test_an_axis_in_place_of_the_size_of_a_fault_is_rejected_with_its_option() -> None:
+    message = refused(2, "sim", "fault", "planar-3", "cut-cable", "upper left", "--bus", "simbus:x")
+    assert "cut-cable upper left: choose the axis with: --axis 'upper left'" in message
