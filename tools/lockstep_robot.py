@@ -90,7 +90,7 @@ class RightInBusTime:
 
     def look(self) -> None:
         """Renew the right if that is due; called every cycle."""
-        if self.token is not None and abs(self._clock_ns() - self._renewed_ns) >= _RENEWED_NS:
+        if self.token is not None and self._clock_ns() - self._renewed_ns >= _RENEWED_NS:
             self._renew(self.token)
 
     def _renew(self, token: str) -> None:
@@ -325,9 +325,8 @@ class LockstepRobot:
 
     @property
     def now_ns(self) -> int:
-        """Bus time since cycles began, in ns."""
-        device = self.machine.device  # not by `now_s`: it is read several times a cycle
-        return 0 if device is None else round(device.feedback.cycle * self.period_s * 1e9)
+        """Bus time, which also passes without cycles and never goes back, in ns."""
+        return round(self.machine.clock.now_s * 1e9)
 
     def turn(self, turns: int = 1) -> None:
         """Run `turns` cycles."""

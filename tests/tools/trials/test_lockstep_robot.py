@@ -143,3 +143,14 @@ def test_cycles_in_one_call_send_the_same_frames_as_single_ones(
         assert robot.state is LoopState.FAULT
     (log,) = tmp_path.glob("frames*.log")
     assert frames_of_jog.setdefault("", log.read_bytes()) == log.read_bytes()
+
+
+def test_a_right_that_has_expired_can_be_taken_after_a_new_boot() -> None:
+    with LockstepRobot("bench-2") as opened:
+        opened.run(3.0)
+        opened.right.fall_silent()
+        opened.simulator.inject("drive-reboot", 1)
+        opened.run(0.5)
+        opened.command("acknowledge")  # cycles are counted from zero again
+        opened.turn(2100)
+        opened.right.take("another")
