@@ -177,7 +177,7 @@ class PoseColumns(Profile):
     quaternion: Annotated[tuple[Column, ...], Field(min_length=4, max_length=4)] | None = None
     """x, y, z, w."""
     rotation_vector: Annotated[tuple[Column, ...], Field(min_length=3, max_length=3)] | None = None
-    """x, y, z, as Vicon exports it; units rad, deg."""
+    """x, y, z, as in exports of Vicon and Qualisys; units rad, deg."""
     axes: tuple[str, str, str] = ("x", "y", "z")
     """The axis of the file's frame along each axis of the robot's room, such as "-x"."""
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Tables of numbers in files of other programs: CSV, OptiTrack and Vicon exports.
+"""Tables of numbers in files of other programs: CSV, and exports of OptiTrack, Vicon and Qualisys.
 
 Every reader returns a `Table`. Its format is recognised by the beginning of the file.
 """
@@ -15,11 +15,12 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from itertools import chain, dropwhile, islice, takewhile, zip_longest
+from itertools import chain, islice, takewhile, zip_longest
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.bounded_input import read_bytes
 from cdpr_profiles.errors import ProfileError, brief, value_text
@@ -34,7 +35,7 @@ _SAMPLE_LINES: Final = 50
 _OPTITRACK: Final = "Format Version"
 _VICON: Final = ("Objects", "Segments", "Trajectories", "Joints", "Model Outputs")
 _QUALISYS: Final = "NO_OF_FRAMES"
-_QUALISYS_FACT: Final = re.compile(r"[A-Z]+(_[A-Z]+)*")
+_QUALISYS_FACT: Final = re.compile(r"[A-Z]{2,}(_[A-Z]+)*")
 TIME: Final = "time_s"
 """Name of the column with the time in formats that contain frame numbers instead."""
 _NUMBER_FIRST: Final = re.compile(r"[\"']?\s*[-+]?[.,]?[0-9]")
@@ -376,32 +377,84 @@ def _read_vicon(path: Path, rows: Iterator[_Row], digest: str) -> Table:
 def _read_qualisys(path: Path, rows: Iterator[_Row], digest: str) -> Table:
     """Read an export of Qualisys Track Manager: columns such as "Platform X", in mm.
 
-    Lines of facts such as FREQUENCY stand above the names. Only the first name of a body contains
-    the body. A hidden body is at 0, 0, 0.
+    Lines of facts such as FREQUENCY stand above the names. Exports may lack all names, or those of
+    the bodies. The rotation matrix of a body becomes its rotation vector "Platform RX", "Platform
+    RY", "Platform RZ", in rad. A hidden body is at 0, 0, 0.
     """
-    rows = dropwhile(lambda row: len(row[1][0]) > 1 and _QUALISYS_FACT.fullmatch(row[1][0]), rows)
-    line, head = next(rows, (0, []))
-    if "Time" not in head:
-        problem = "no line of names with `Time`; export with column headers and time"
-        raise ProfileError(path, f"line {line}" if line else "", problem)
-    names, units, body = [], {TIME: "s"}, ""
-    faults: dict[str, ProfileError] = {}
+    facts: dict[str, list[str]] = {}
+    first: _Row = (0, [])
+    for first in rows:
+        name, *values = first[1]
+        if not values or not _QUALISYS_FACT.fullmatch(name):
+            break
+        facts[name] = _cells(values)
+    head = first[1]
+    if all(map(_is_number, _cells(head))):  # without a line of names
+        rows, head = chain([first], rows), [*"XYZ"]
+    names = _qualisys_names(head, [*facts.get("MARKER_NAMES", []), *facts.get("BODY_NAMES", [])])
+    if not any(name.endswith(" X") for name in names):
+        problem = "no names of markers or bodies; export with column headers and time"
+        raise ProfileError(path, f"line {first[0]}", problem)
+    table = _table(path, digest, names, rows, {})
+    columns, units, faults = table.columns, {TIME: "s"}, table.faults
+    if TIME not in columns:
+        count = columns.get("Frame", np.arange(1.0, table.lines.size + 1.0))
+        columns[TIME] = (count - 1.0) / _rate(path, facts.get("FREQUENCY", []))
+    for name in names:
+        body, _, axis = name.rpartition(" ")
+        if axis in ("Roll", "Pitch", "Yaw"):
+            problem = f"is an Euler angle of unknown order; allowed: {body} RX, RY and RZ"
+            faults[name] = ProfileError(path, name, problem)
+        place = [f"{body} {one}" for one in "XYZ"]
+        if axis != "X" or not columns.keys() >= {*place}:
+            continue
+        seen = np.any([columns[one] for one in place], axis=0)
+        matrix = [columns[one] for i in range(9) if (one := f"{body} Rot[{i}]") in columns]
+        if len(matrix) == 9:
+            turned = [f"{body} R{one}" for one in "XYZ"]
+            vectors = _rotation_vectors(np.array(matrix).T, seen)
+            columns |= dict(zip(turned, vectors.T, strict=True))
+            units |= dict.fromkeys(turned, "rad")
+        units |= dict.fromkeys(place, "mm")
+        for one in place:
+            columns[one] = np.where(seen, columns[one], np.nan)
+    return replace(table, units=units)
+
+
+def _qualisys_names(head: list[str], bodies: list[str]) -> list[str]:
+    """Return the name of each column: its body and its axis.
+
+    `head` is the line of names: the first name of a body contains it, or the names apply to each of
+    `bodies`, with an empty column between them.
+    """
+    if head[:1] == ["X"]:
+        of_one = [*head, ""] if len(head) > len("XYZ") else head
+        return [cell and f"{body} {cell}" for body in bodies for cell in of_one]
+    names, body = [], ""
     for cell in head:
         *above, axis = cell.rsplit(" ", 1)
         body = above[0] if above else body
-        name = TIME if cell == "Time" else f"{body} {axis}".strip() if cell else ""
-        names.append(name)
-        if axis in ("X", "Y", "Z"):
-            units[name] = "mm"
-        elif axis in ("Roll", "Pitch", "Yaw"):
-            problem = "is an Euler angle of unknown order; allowed: positions"
-            faults[name] = ProfileError(path, name, problem)
-    table = _table(path, digest, names, rows, units)
-    for name in names:
-        parts = [name[:-1] + axis for axis in "XYZ"]
-        place = [table.columns[part] for part in parts if part in names]
-        if name.endswith("X") and len(place) == len("XYZ"):
-            hidden = ~np.any(place, axis=0)
-            for values in place:
-                values[hidden] = np.nan
-    return replace(table, faults=table.faults | faults)
+        names.append(TIME if cell == "Time" else f"{body} {axis}".strip() if cell else "")
+    return names
+
+
+def _rate(path: Path, stated: list[str]) -> float:
+    """Return the rate of a Qualisys export in Hz."""
+    try:
+        rate = float(stated[0])
+    except (IndexError, ValueError):
+        rate = math.nan
+    if not 0.0 < rate < math.inf:
+        problem = f"value {value_text(' '.join(stated))}; allowed: the rate in Hz, or a column Time"
+        raise ProfileError(path, "FREQUENCY", problem)
+    return rate
+
+
+def _rotation_vectors(matrices: FloatArray, seen: BoolArray) -> FloatArray:
+    """Return the rotation vectors (k, 3) of matrices (k, 9), column by column; nan if not seen."""
+    vectors = np.full((len(matrices), 3), np.nan)
+    whole = seen & (np.linalg.norm(matrices, axis=1) > 1.0)
+    by_row = matrices[whole].reshape(-1, 3, 3).transpose(0, 2, 1)
+    if whole.any():
+        vectors[whole] = Rotation.from_matrix(by_row).as_rotvec()
+    return vectors

@@ -111,8 +111,40 @@ def test_a_qualisys_export_has_columns_by_body_in_mm(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="Platform Roll: is an Euler angle"):
         table.column("Platform Roll")
     assert table.units["Platform X"] == "mm"
-    with pytest.raises(ProfileError, match=r"line 5: no line of names with `Time`"):
-        read_table(written(tmp_path, QUALISYS.replace("Frame\tTime", "Frame\tt")))
+    without_time = read_table(written(tmp_path, QUALISYS.replace("Frame\tTime", "Frame\tt")))
+    assert without_time.column("time_s") == pytest.approx([0.0, 0.01])
+    with pytest.raises(ProfileError, match="FREQUENCY: value ''; allowed: the rate in Hz"):
+        read_table(written(tmp_path, "NO_OF_FRAMES\t1\nMARKER_NAMES\tA\n1\t2\t3\n"))
+    with pytest.raises(ProfileError, match="line 2: no names of markers or bodies"):
+        read_table(written(tmp_path, "NO_OF_FRAMES\t1\n1\t2\t3\n"))
+
+
+def test_a_qualisys_export_without_column_headers_has_the_names_of_its_markers(
+    tmp_path: Path,
+) -> None:
+    text = (
+        "NO_OF_FRAMES\t2\nFREQUENCY\t250\nDATA_INCLUDED\t3D\nMARKER_NAMES\tHip\tArm - 1\n"
+        "1\t2\t3\t4\t5\t6\n1.5\t2\t3\t0.000\t0.000\t0.000\n"
+    )
+    table = read_table(written(tmp_path, text))
+    assert table.column("time_s") == pytest.approx([0.0, 0.004])
+    assert table.column("Hip X") == pytest.approx([1.0, 1.5])
+    assert table.column("Arm - 1 Z") == pytest.approx([6.0, np.nan], nan_ok=True)
+
+
+def test_a_qualisys_rotation_matrix_becomes_a_rotation_vector(tmp_path: Path) -> None:
+    # turned by +90 deg about z: Rot[1] is sin(angle); then hidden
+    axes = "\t".join([" X", " Y", " Z", " Yaw", " Residual", *(f" Rot[{i}]" for i in range(9))])
+    turned, hidden = "1\t2\t3\t90\t0.1\t0\t1\t0\t-1\t0\t0\t0\t0\t1", "\t".join(["0.000"] * 14)
+    text = (
+        f"NO_OF_FRAMES\t2\nFREQUENCY\t100\nBODY_NAMES\tWand\tPlatform\n{axes}\n"
+        f"{turned}\t\t{turned}\n{turned}\t\t{hidden}\n"
+    )
+    table = read_table(written(tmp_path, text))
+    assert table.column("Wand RZ") == pytest.approx([np.pi / 2] * 2)
+    assert table.column("Platform RZ") == pytest.approx([np.pi / 2, np.nan], nan_ok=True)
+    assert table.column("Platform RX")[0] == pytest.approx(0.0)
+    assert table.units["Platform RX"] == "rad"
 
 
 @pytest.mark.parametrize(
