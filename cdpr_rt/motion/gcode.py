@@ -6,6 +6,7 @@ Supported are the codes of RS274/NGC that have a meaning for a platform without 
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -201,6 +202,11 @@ def read_gcode(
     return _Reader(source, coordinates, settings).read(text)
 
 
+def _without_axis(letter: str) -> str:
+    """Return the problem that the robot has no axis of this letter."""
+    return f"{letter}: the robot has no such axis; --ignore {letter} drops it from the whole file"
+
+
 class _LineError(Exception):
     """A line cannot be followed; the message gives the reason."""
 
@@ -234,6 +240,8 @@ class _Reader:
         """Lines and seconds."""
         self._turns: set[str] = set()
         """Rotary axes that the path uses."""
+        self._rotary: set[str] = set()
+        """Rotary axes that the file names."""
         self._last = 0
         self._in_room = False
 
@@ -241,20 +249,14 @@ class _Reader:
         found = self._findings
         for block in blocks(text, found, self._settings.ignored):
             self._last = block.line
+            self._rotary |= block.words.keys() & {*"ABC"}
             try:
                 self._execute(block)
             except _LineError as error:
                 found.refuse(block.line, str(error))
                 self._go_on_from(block)
         if self._path is None or not self._path.moves:
-            missing = self._missing()
-            why = f"{missing} is never given" if missing else "nothing moves"
-            hint = ": give the height with --z" if missing == "Z" else ""
-            if missing and not hint:
-                hint = f"; begin with a position, such as G0 {missing.replace(' ', '0 ')}0"
-            # a rejected line may contain the missing coordinate
-            if not found.problems:
-                found.refuse(self._last, f"{why}; allowed: a path through two positions{hint}")
+            self._refuse_no_path(text)
         found.require_none()
         assert self._path is not None  # otherwise a problem would have been found
         if self._long_dwells:
@@ -272,6 +274,32 @@ class _Reader:
         self._path.notices += found.notices()
         self._path.in_room = self._in_room
         return self._path
+
+    def _refuse_no_path(self, text: str) -> None:
+        """Record which coordinates the file never gives, or that nothing moves."""
+        found, missing = self._findings, self._missing().split()
+        if found.problems:  # a rejected line may contain the missing coordinate
+            given = re.findall(r"([A-Z])\s*[-+.0-9]", text.upper())
+            missing = [letter for letter in missing if letter not in given]
+            if not missing:
+                return
+        are = "are" if len(missing) > 1 else "is"
+        why = f"{' '.join(missing)} {are} never given" if missing else "nothing moves"
+        begin = f"begin with a position, such as G0 {'0 '.join(missing)}0" if missing else ""
+        rotary = sorted(self._rotary)
+        if not rotary or not {*missing} & {*"XY"}:
+            hint = ": give the height with --z" if missing == ["Z"] else begin and f"; {begin}"
+            found.refuse(self._last, f"{why}; allowed: a path through two positions{hint}")
+            return
+        for letter in rotary:
+            found.problems.pop(_without_axis(letter), None)
+        turns = begin and f"; if {rotary[0]} turns the platform, {begin}"
+        found.refuse(
+            self._last,
+            f"{why}, and {' '.join(rotary)} turns the workpiece on a machine with a rotary axis, "
+            "which this robot lacks; have the CAM program make a flat path, not one wrapped around "
+            f"an axis{turns if {*rotary} <= {*self._letters} else ''}",
+        )
 
     def _execute(self, block: Block) -> None:
         """Execute one line, in the order that RS274 defines."""
@@ -326,12 +354,9 @@ class _Reader:
             raise _LineError("Z: --z is only for files without Z")
         for letter in sorted(words.keys() - self._known_letters):
             del words[letter]
-            problem = "is not known"
-            if letter in _AXES:
-                problem = "the robot has no such axis"
-            self._findings.refuse(
-                block.line, f"{letter}: {problem}; --ignore {letter} drops it from the whole file"
-            )
+            unknown_word = f"{letter}: is not known; --ignore {letter} drops it from the whole file"
+            problem = _without_axis(letter) if letter in _AXES else unknown_word
+            self._findings.refuse(block.line, problem)
         return not unknown
 
     def _set_modes(self, codes: tuple[str, ...], words: dict[str, float]) -> None:

@@ -161,6 +161,34 @@ def test_unsupported_codes_are_rejected(lines, where, told):
         read(*lines, "M2", where=where)
 
 
+ROTARY = ("G21 G90 G94", "G0 Z5 A0", "G0 X0", "G1 Z-1 F200", "G1 X10 A90", "X20 A180", "M5", "M2")
+
+
+def test_a_file_for_a_rotary_axis_is_rejected_with_the_advice_to_make_it_flat():
+    with pytest.raises(PathError) as caught:
+        read(*ROTARY)
+    assert "part.nc:8: Y is never given, and A turns the workpiece" in str(caught.value)
+    assert "make a flat path" in str(caught.value)
+    assert "if A turns the platform, begin with a position, such as G0 Y0" in str(caught.value)
+
+
+def test_a_robot_without_rotation_rejects_a_rotary_file_with_all_reasons_but_not_to_ignore_it():
+    with pytest.raises(PathError) as caught:
+        read(*ROTARY, where=PLANE)
+    text = str(caught.value)
+    assert [line.split(":")[1] for line in text.split("\n")] == ["2", "8"]
+    assert "2: Z: the robot has no such axis" in text
+    assert "Y is never given" in text
+    assert "--ignore A" not in text
+    assert "turns the platform" not in text
+
+
+def test_a_coordinate_that_only_a_rejected_line_contains_is_not_reported_as_missing():
+    with pytest.raises(PathError) as caught:
+        read("G0 X0 Z1", "G41 Y5 #1=3", "G1 X5 F60", "M2")
+    assert "never given" not in str(caught.value)
+
+
 def test_all_problems_are_reported_together_by_line():
     with pytest.raises(PathError) as caught:
         read(
