@@ -158,9 +158,9 @@ def _refuse_unsound(found: TensionGain, nominal_m: float) -> None:
         )
     if abs(gain - nominal_m) > MOST_GAIN_ERROR * nominal_m:
         raise CalibrationRefusedError(
-            f"the gain, {gain * 1e3:.2f} mNm/N, is far from the geometry's {nominal_m * 1e3:.2f} "
-            "(drum_radius_m / gear_ratio); are the given gear ratio, drum radius, masses "
-            "and sensor scale right?"
+            f"the gain, {gain * 1e3:.2f} mNm/N, is {gain / nominal_m:.2f} times the geometry's "
+            f"{nominal_m * 1e3:.2f} (drum_radius_m / gear_ratio); are gear ratio, drum radius, "
+            "masses, sensor scale and the drive's torque_unit right?"
         )
     middle = 0.5 * (found.lowest_N + found.highest_N)
     friction = found.friction_Nm.value + found.friction_per_N_m.value * middle

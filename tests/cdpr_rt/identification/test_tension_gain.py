@@ -102,7 +102,7 @@ def test_measurements_that_are_too_few_or_too_poor_are_rejected() -> None:
     assert_rejected(points([50.0, 55.0, 60.0]), r"reach from 50.0 to 60.0 N")
     assert_rejected(points([20.0, 50.0, 80.0], gain=-0.026, share=0.0), "cable_sign")
     assert_rejected(
-        points([20.0, 50.0, 80.0], gain=0.052, share=0.0), "far from the geometry's 26.00"
+        points([20.0, 50.0, 80.0], gain=0.052, share=0.0), "is 2.00 times the geometry's 26.00"
     )
     assert_rejected(
         points([20.0, 50.0, 80.0], friction=-0.2, share=0.0), "torque or the cable wrong"
