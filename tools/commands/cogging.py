@@ -156,22 +156,30 @@ def compare_runs(
     """Compare how well each method explains the torque of other recordings of the motor.
 
     R2 is the share of the torque's variance that the curve over the angle explains. Recordings in
-    FOLDER itself are marked: the curves were identified from them.
+    FOLDER itself are marked: the curves were identified from them. Hysteresis shifts static maps,
+    and the direction that was not identified. A second line gives R2 at the best shift up to 1 deg.
     """
     out = Output(as_json)
     profile = CoggingProfile.load(Paths(folder).profile)
     used = comparison.runs_of(folder)
-    curves = comparison.tables(profile, [run for run in used if run.path.stem[:3] != "map"])
+    swept = [run for run in used if not run.is_static]
+    curves = comparison.tables(profile, swept)
     rows, results = [["recording", *comparison.CURVES]], []
     others = [other for other in others if other.resolve() != folder.resolve()]
     for run in [*used, *(run for other in others for run in comparison.runs_of(other))]:
-        by_method = {
-            name: comparison.explained(curves[name][run.direction], run)
-            for name in comparison.CURVES
-        }
+        of_run = {name: curves[name][run.direction] for name in comparison.CURVES}
+        by_method = {name: comparison.explained(curve, run) for name, curve in of_run.items()}
         own = " (used for the identification)" if run in used else ""
         rows.append([f"{run.path}{own}", *(f"{r2:.4f}" for r2 in by_method.values())])
-        results.append({"recording": str(run.path), "identified_from": bool(own), "r2": by_method})
+        facts = {"recording": str(run.path), "identified_from": bool(own), "r2": by_method}
+        results.append(facts)
+        if run.is_static or run.direction not in {one.direction for one in swept}:
+            best = {name: comparison.best_shift(curve, run) for name, curve in of_run.items()}
+            shown = [f"{r2:.4f} at {math.degrees(by):+.2f} deg" for r2, by in best.values()]
+            rows.append(["  at the best shift of the angle", *shown])
+            facts["shifted"] = {
+                name: {"r2": r2, "shift_deg": math.degrees(by)} for name, (r2, by) in best.items()
+            }
     out.say("R2 of the torque without its mean friction", TableText(rows, left=["recording"]))
     out.result({"ok": True, "runs": results})
 

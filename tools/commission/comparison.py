@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +19,7 @@ from cdpr_rt.identification.windows import SweepData
 LEAST_SQUARES_ORDERS: Final = 40
 CURVES: Final = ("harmonic", "thesis", "least squares")
 _SETTLED_LAGS: Final = 3.0
+_SHIFTS_RAD: Final = np.radians(np.linspace(-1.0, 1.0, 41))
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,11 @@ class Run:
     def direction(self) -> int:
         """0 for increasing angles, 1 for decreasing ones: the rows of a profile's tables."""
         return int(self.sweep.setpoint_velocity_rad_s.mean() < 0.0)
+
+    @property
+    def is_static(self) -> bool:
+        """Whether it is a map of torques at standstill, approached from an unknown direction."""
+        return self.path.stem.startswith("map")
 
 
 def runs_of(folder: Path) -> list[Run]:
@@ -60,6 +66,19 @@ def explained(table_Nm: FloatArray, run: Run) -> float:
         for values in (sweep.torque_Nm - curve, sweep.torque_Nm)
     )
     return float(1.0 - np.var(left) / np.var(torque))
+
+
+def best_shift(table_Nm: FloatArray, run: Run) -> tuple[float, float]:
+    """Return the largest R2 of a run, and the shift of the curve by up to 1 deg, rad, for it.
+
+    Hysteresis shifts the cogging between the directions of motion. Runs in one direction do not
+    determine this shift.
+    """
+    r2, shift = -np.inf, 0.0
+    for by in _SHIFTS_RAD:
+        moved = replace(run.sweep, angle_rad=run.sweep.angle_rad - by)
+        r2, shift = max((r2, shift), (explained(table_Nm, replace(run, sweep=moved)), float(by)))
+    return r2, shift
 
 
 def tables(profile: CoggingProfile, used: Sequence[Run]) -> dict[str, FloatArray]:
