@@ -200,18 +200,21 @@ def import_(
             metavar="KEY=VALUE",
         ),
     ] = None,
+    upright: Annotated[
+        bool, option("Read a horizontal plane as an upright one, with gravity along -y.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write a robot's file from a CASPR model.
 
-    Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`.
-    The platform's origin is its centre of mass. The plane of a planar robot becomes vertical. If
-    the robot cannot work with its winches, the file is written anyway, and you can edit it.
+    Geometry, mass and tensions come from the model, all else from the defaults of `cdpr robot new`,
+    but no turned targets. The platform's origin is its centre of mass. If the robot cannot work
+    with its winches, the file is written anyway, and you can edit it.
     """
     out = Output(as_json)
     _require_new(path)
     given = _given(answers or ())
-    ask = read_caspr(bodies, cables)
+    ask = read_caspr(bodies, cables, upright=upright)
     complete = new_robot.answers_of(path, given, ask, out.stage)
     for note in ask.notes:
         out.say(f"not from the model: {note}")

@@ -15,21 +15,22 @@ import numpy as np
 from cdpr_profiles.bounded_input import read_text
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.questions import KINDS, Default, Question
+from cdpr_tools.robots.questions import KINDS, Default, Question, kind_of
 
 _PLANES: Final = {"XY": [0, 1], "XZ": [0, 2], "YZ": [1, 2]}
-"""Coordinates of planar joints, such as PLANAR_XZ or P_XZ; the second one becomes the height."""
+"""Coordinates of planar joints, such as PLANAR_XZ or P_XZ; the second one becomes the height.
+Gravity acts along -z, so the plane of x and y is horizontal."""
 _LEAST_SHARE: Final = 0.01
 """Ratio of least to greatest tension, for models whose cables may be slack."""
 _MOST_BYTES: Final = 1 << 20
 
 
-def read_caspr(bodies: Path, cables: Path) -> ModelAnswers:
+def read_caspr(bodies: Path, cables: Path, *, upright: bool = False) -> ModelAnswers:
     """Return answers from a model with one rigid body; the platform's origin is its centre of mass.
 
-    The plane of a planar robot becomes vertical. In CASPR gravity acts along -z, so the plane of x
-    and y is horizontal there, which a note says. If there are several sets of cables, the model's
-    default set is used. Raises BadInputError that names the file and the element.
+    A horizontal plane, in which no gravity acts, is only read as an `upright` one, with y upward.
+    If there are several sets of cables, the model's default set is used. Targets are not turned.
+    Raises BadInputError that names the file and the element.
     """
     links = _root(bodies, "bodies_system").findall("links/*")
     if len(links) != 1:
@@ -42,6 +43,13 @@ def read_caspr(bodies: Path, cables: Path) -> ModelAnswers:
         raise BadInputError(
             f"{bodies}: joint: type {joint!r}; allowed: PLANAR_XY, P_XY, or another plane, P_XYZ, "
             "SPATIAL_..."
+        )
+    if plane == "XY" and not upright:
+        raise BadInputError(
+            f"{bodies}: joint: type {joint!r}: the plane is horizontal, without gravity in it; "
+            "tightening, lowering and the tensions rely on gravity along the last coordinate, and "
+            "a robot's file has no key to turn it off; allowed: XZ, YZ, or --upright for a robot "
+            "of this geometry that stands upright, with y upward"
         )
     room_m = _point(link, "parent/location", bodies)
     centre_m = _point(link, "physical/com_location", bodies)
@@ -69,9 +77,13 @@ def read_caspr(bodies: Path, cables: Path) -> ModelAnswers:
         for number, point in enumerate(points, start=1):
             answers[f"{name}_{number}_m"] = ", ".join(f"{x:.6g}" for x in point[kept])
     kind = kind_of_points(np.array(exits)[:, kept], np.array(anchors)[:, kept], cables)
-    is_flat = plane == "XY"
-    note = "gravity: the model's plane is horizontal; this robot's is vertical, with y upward"
-    return ModelAnswers({"kind": kind, **answers}, [note] * is_flat)
+    notes = []
+    if plane == "XY":
+        notes.append("gravity: the model's plane is horizontal; this robot stands upright")
+    if kind_of(kind).controls_angles:
+        answers["angle_deg"] = "0"
+        notes.append("angle_deg: models have none; 0: no turned targets, otherwise --set angle_deg")
+    return ModelAnswers({"kind": kind, **answers}, notes)
 
 
 class ModelAnswers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
@@ -13,19 +14,19 @@ from tests.cdpr_here import cdpr_here
 BODIES = """<?xml version="1.0" encoding="utf-8"?>
 <!DOCTYPE bodies_system SYSTEM "../../../../templates/bodies.dtd">
 <bodies_system><links><link_rigid num="1" name="Link 1">
-  <joint type="PLANAR_XY" q_initial="0 0 0"/>
-  <physical><mass>2.5</mass><com_location>0.02 -0.01 0</com_location></physical>
+  <joint type="PLANAR_XZ" q_initial="0 0 0"/>
+  <physical><mass>2.5</mass><com_location>0.02 0 -0.01</com_location></physical>
   <parent><num>0</num><location>0.5 0 0</location></parent>
 </link_rigid></links></bodies_system>
 """
 CABLE = """<cable_ideal name="cable {number}" attachment_reference="{reference}">
   <properties><force_min>{least}</force_min><force_max>{most}</force_max></properties>
   <attachments>
-    <attachment><link>0</link><location>{exit} 0</location></attachment>
-    <attachment><link>1</link><location>{anchor} 0</location></attachment>
+    <attachment><link>0</link><location>{exit}</location></attachment>
+    <attachment><link>1</link><location>{anchor}</location></attachment>
   </attachments></cable_ideal>"""
-EXITS = ["-1.5 0.2", "-1.5 2.8", "2.5 2.8", "2.5 0.2"]
-ANCHORS = ["-0.1 0.1", "-0.1 -0.1", "0.1 -0.1", "0.1 0.1"]
+EXITS = ["-1.5 0 0.2", "-1.5 0 2.8", "2.5 0 2.8", "2.5 0 0.2"]
+ANCHORS = ["-0.1 0 0.1", "-0.1 0 -0.1", "0.1 0 -0.1", "0.1 0 0.1"]
 
 
 def cables(
@@ -43,12 +44,27 @@ def cables(
     return f'<cables default_cable_set="basic">{unused}{chosen}</cables>'
 
 
-def imported(folder: Path, bodies: str = BODIES, cables: str = cables()) -> tuple[int, str, Path]:
+def turned(text: str, plane: tuple[int, int]) -> str:
+    """Return a file of the model with the coordinates x and z along those of `plane`."""
+
+    def point(match: re.Match[str]) -> str:
+        x, _, z = match[1].split()
+        coordinates = ["0", "0", "0"]
+        coordinates[plane[0]], coordinates[plane[1]] = x, z
+        return f">{' '.join(coordinates)}</{match[2]}>"
+
+    return re.sub(r">([^<> ]+ [^<> ]+ [^<> ]+)</((?:com_)?location)>", point, text)
+
+
+def imported(
+    folder: Path, bodies: str = BODIES, cables: str = cables(), *options: str
+) -> tuple[int, str, Path]:
     """Import a model; return the exit status, the output and the robot's file."""
     (folder / "b.xml").write_text(bodies)
     (folder / "c.xml").write_text(cables)
     path = folder / "robot.toml"
-    done = cdpr_here("robot", "import", str(folder / "b.xml"), str(folder / "c.xml"), str(path))
+    files = (str(folder / "b.xml"), str(folder / "c.xml"), str(path))
+    done = cdpr_here("robot", "import", *files, *options)
     return done.returncode, done.stdout + done.stderr, path
 
 
@@ -65,19 +81,43 @@ def test_geometry_and_mass_come_from_the_model(tmp_path: Path) -> None:
     assert robot.limits.tension_min_N == pytest.approx((1.2,))
 
 
-def test_a_horizontal_plane_is_noted_and_a_vertical_one_keeps_its_height(tmp_path: Path) -> None:
-    *_, output, path = imported(tmp_path)
-    assert "the model's plane is horizontal" in output
+def test_a_horizontal_plane_is_rejected_and_read_upright_only_on_request(tmp_path: Path) -> None:
+    bodies, given = (turned(text, (0, 1)) for text in (BODIES.replace("XZ", "XY"), cables()))
+    status, output, path = imported(tmp_path, bodies, given)
+    assert status == 2
+    assert "joint: type 'PLANAR_XY': the plane is horizontal" in output
+    assert "a robot's file has no key to turn it off" in output
+    assert not path.exists()
+    status, output, path = imported(tmp_path, bodies, given, "--upright")
+    assert status == 0, output
+    assert "gravity: the model's plane is horizontal; this robot stands upright" in output
+    upright = load_robot(path).platform
+    path.unlink()
+    imported(tmp_path)
+    assert load_robot(path).platform == upright
+
+
+def test_a_vertical_plane_of_y_and_z_has_the_same_robot_as_one_of_x_and_z(tmp_path: Path) -> None:
+    *_, path = imported(tmp_path)
     platform = load_robot(path).platform
     path.unlink()
-    # x y 0 becomes x 0 y
-    bodies, given = BODIES.replace("XY", "XZ"), cables()
-    bodies = re.sub(r"(\S+) (\S+) 0(</(com_)?location>)", r"\1 0 \2\3", bodies)
-    given = re.sub(r"(\S+) (\S+) 0(</location>)", r"\1 0 \2\3", given)
+    bodies, given = (turned(text, (1, 2)) for text in (BODIES.replace("XZ", "YZ"), cables()))
     status, output, path = imported(tmp_path, bodies, given)
     assert status == 0, output
-    assert "plane is horizontal" not in output
     assert load_robot(path).platform == platform
+
+
+def test_targets_are_not_turned_unless_the_angle_is_given(tmp_path: Path) -> None:
+    *_, output, path = imported(tmp_path)
+    assert "not from the model: angle_deg: models have none" in output
+    platform = load_robot(path).platform
+    assert platform is not None
+    assert platform.workspace_angle_rad == 0.0
+    path.unlink()
+    *_, path = imported(tmp_path, BODIES, cables(), "--set", "angle_deg=3")
+    platform = load_robot(path).platform
+    assert platform is not None
+    assert platform.workspace_angle_rad == pytest.approx(np.radians(3.0), rel=1e-4)
 
 
 def test_attachments_may_refer_to_the_centre_of_mass(tmp_path: Path) -> None:
@@ -96,9 +136,9 @@ def test_tensions_beyond_the_winches_are_not_taken_and_named(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("bodies", "given", "reason"),
     [
-        (BODIES.replace("PLANAR_XY", "S_EULER_XYZ"), cables(), "joint: type 'S_EULER_XYZ'"),
+        (BODIES.replace("PLANAR_XZ", "S_EULER_XYZ"), cables(), "joint: type 'S_EULER_XYZ'"),
         (BODIES.replace("2.5<", "<"), cables(), "mass"),
-        (BODIES.replace("0.02 -0.01 0", "0.02 x 0"), cables(), "com_location: '0.02 x 0'"),
+        (BODIES.replace("0.02 0 -0.01", "0.02 x 0"), cables(), "com_location: '0.02 x 0'"),
         ("<bodies_system><links/></bodies_system>", cables(), "links: 0 bodies"),
         ("<other/>", cables(), "begins with <other>"),
         ("no xml", cables(), "is not XML"),
