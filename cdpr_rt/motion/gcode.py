@@ -279,7 +279,7 @@ class _Reader:
         """Record which coordinates the file never gives, or that nothing moves."""
         found, missing = self._findings, self._missing().split()
         if found.problems:  # a rejected line may contain the missing coordinate
-            given = re.findall(r"([A-Z])\s*[-+.0-9]", text.upper())
+            given = re.findall(r"([A-Z])\s*[-+.0-9#\[]", text.upper())
             missing = [letter for letter in missing if letter not in given]
             if not missing:
                 return
@@ -371,7 +371,9 @@ class _Reader:
             state.feed = math.nan
         if "F" in words:
             state.feed, state.feed_unit_m = words.pop("F"), state.unit_m
-            if not state.feed > 0.0:
+            if state.feed == 0.0:  # written with G0 by CAM programs that know no speed
+                state.feed = math.nan
+            elif not state.feed > 0.0:
                 raise _LineError(f"F{state.feed:g}: allowed: above 0")
         elif state.inverse_time:
             state.feed = math.nan  # valid for one line only
@@ -530,8 +532,8 @@ class _Reader:
         """Return the speed of a move, m/s, or rad/s if it only turns."""
         state, k = self._state, self._k
         if not math.isfinite(state.feed):
-            also = " in the same line (G93)" if state.inverse_time else " before it"
-            raise _LineError(f"{motion} without a feed; allowed: F{also}")
+            also = "in the same line (G93)" if state.inverse_time else "before it"
+            raise _LineError(f"{motion} without a feed; allowed: F above 0 {also}")
         way = self._room(target) - self._room(start)
         turns_only = arc is None and not way[:k].any()
         if state.inverse_time:
@@ -659,8 +661,8 @@ class _Reader:
     # -- stops
 
     def _dwell(self, block: Block, words: dict[str, float]) -> None:
-        if _AXES & set(words):
-            raise _LineError("G4: give P or S, and no axes")
+        if _AXES & set(words) and not set(block.codes) & set(_MOTIONS):
+            raise _LineError("G4: give P or S, and no axes without G0 to G3")
         seconds = words.pop("S", math.nan)  # used by 3D printers
         if "P" in words:
             seconds = words.pop("P") * self._settings.dwell_unit_s

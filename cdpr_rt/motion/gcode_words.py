@@ -47,6 +47,10 @@ _IDLE_CODES: Final = frozenset(
 _ALONE: Final = frozenset(("M10", "M11", "M48", "M49"))
 """Codes of clamps and overrides. Other words in a line with such a code and without a G code are
 not a motion."""
+_OUTPUTS: Final = {
+    **dict.fromkeys(("M62", "M63", "M64", "M65"), "P"), "M67": "Q", "M68": "Q",
+}  # fmt: skip
+"""Letter of the number or value of an output, which may share a line with a motion."""
 _TEXTS: Final = frozenset(("M117", "M118"))
 _IDLE_LINES: Final = _TEXTS | {
     f"M{number}"
@@ -250,7 +254,7 @@ def _unreadable(line: str) -> str:
 def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) -> Block | None:
     codes: list[str] = []
     words: dict[str, float] = {}
-    at, alone = 0, ""
+    at, alone, of_output = 0, "", ""
     while at < len(line):
         match = _WORD.match(line, at)
         # a letter without a number, as in printers' G28 X Y
@@ -279,12 +283,15 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
         if letter == "N":
             continue
         seconds = letter == "S" and "G4" in codes
-        output = letter == "P" and alone and "G" not in line.upper()  # as in Mach3's M11 P1
+        output = letter == of_output
+        output |= letter == "P" and bool(alone) and "G" not in line.upper()  # as in Mach3's M11 P1
+        of_output = "" if letter == of_output else of_output
         if (letter in IDLE_LETTERS and not seconds) or letter in ignored or output:
             findings.ignore(number, letter)
-        elif name in _IDLE_CODES:
+        elif name in _IDLE_CODES or name in _OUTPUTS:
             findings.ignore(number, name)
             alone = name if name in _ALONE else alone
+            of_output = _OUTPUTS.get(name, of_output)
         elif name in ignored or name in _IDLE_LINES:
             findings.refuse(number, f"{name} is on a line with other words; split it")
         elif letter in _REPEATED:

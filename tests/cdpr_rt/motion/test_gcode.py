@@ -132,7 +132,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
         (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
         (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: a number must have no exponent"),
-        (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: give P or S, and no axes"),
+        (["G0 X0 Y0 Z0", "G4 X2"], ROOM, r":2: G4: give P or S, and no axes without G0"),
         (["G0 X0 Y0 Z0", "G80", "X5"], ROOM, r":3: .* without a motion after G80"),
         (["G0 X0 Y0 Z0", "F60 G93", "G1 X5"], ROOM, r":3: G1 without a feed; .* in the same line"),
         (["G0 X0 Y0 Z0", "G55 X5"], ROOM, r":2: G55: its zero is unknown; give --origin"),
@@ -159,6 +159,29 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
 def test_unsupported_codes_are_rejected(lines, where, told):
     with pytest.raises(PathError, match=told):
         read(*lines, "M2", where=where)
+
+
+def test_a_dwell_may_precede_the_motion_of_its_line():
+    path = read("G0 X0 Y0 Z0", "G4 P.5 G0 X1", "M2")
+    assert [move.dwell_s for move in path.moves] == [0.5, 0.0]
+    assert path.moves[1].end[0] - path.start[0] == pytest.approx(0.001)
+
+
+def test_a_feed_of_zero_is_allowed_for_rapid_moves_only():
+    path = read("G0 F0.000 X0 Y0 Z0", "G1 X5 F600", "G0 F0.000 X6", "M2")
+    assert len(path.moves) == 2
+    with pytest.raises(PathError, match=":2: G1 without a feed; allowed: F above 0 before it"):
+        read("G0 F0 X0 Y0 Z0", "G1 X5", "M2")
+
+
+def test_an_output_that_shares_its_line_with_a_motion_is_ignored_with_its_value():
+    path = read("G0 X0 Y0 Z0 F600", "G1 X5 M67 E2 Q25", "G1 X6 M62 P1", "M2")
+    assert len(path.moves) == 2
+    assert path.notices == [
+        "ignored: M67 (line 2), E (line 2), Q (line 2), M62 (line 3), P (line 3)"
+    ]
+    with pytest.raises(PathError, match=":2: Q: has no meaning with G1"):
+        read("G0 X0 Y0 Z0 F600", "G1 X5 M67 E2 Q25 Q1", "M2")
 
 
 ROTARY = ("G21 G90 G94", "G0 Z5 A0", "G0 X0", "G1 Z-1 F200", "G1 X10 A90", "X20 A180", "M5", "M2")
