@@ -15,7 +15,7 @@ import numpy as np
 from cdpr_profiles.bounded_input import read_text
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.questions import KINDS, Default, Question, kind_of
+from cdpr_tools.robots.questions import KINDS, SEVEN_CABLES, Default, Question, kind_of
 
 _PLANES: Final = {"XY": [0, 1], "XZ": [0, 2], "YZ": [1, 2]}
 """Coordinates of planar joints, such as PLANAR_XZ or P_XZ; the second one becomes the height.
@@ -107,7 +107,7 @@ class ModelAnswers:
 
 
 def kind_of_points(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
-    """Return the kind of `KINDS` with this number of cables; raises BadInputError for others."""
+    """Return the kind with this number of cables; raises BadInputError if there is none."""
     count, size = exits_m.shape
     heights = exits_m[:, -1]
     is_point = not np.ptp(anchors_m, axis=0).any()
@@ -117,10 +117,11 @@ def kind_of_points(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> st
         kind = f"point-{count}"
     else:
         kind = f"{'suspended' if heights.min() > 0.5 * heights.max() else 'spatial'}-{count}"
-    if kind not in KINDS:
+    if kind not in KINDS | SEVEN_CABLES:
+        allowed = ", ".join(KINDS | SEVEN_CABLES)
         raise BadInputError(
-            f"{file}: {count} cables make it {kind}; allowed: {', '.join(KINDS)}; for another "
-            "number write the file with the nearest kind by `cdpr robot new` and add [[axes]]"
+            f"{file}: {count} cables make it {kind}; allowed: {allowed}; for another number write "
+            "the file with the nearest kind by `cdpr robot new` and add [[axes]]"
         )
     return kind
 

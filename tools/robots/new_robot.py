@@ -24,7 +24,6 @@ from cdpr_rt.model.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.rendering import rendered
 from cdpr_tools.robots.questions import (
-    KINDS,
     AnswerError,
     Answers,
     Default,
@@ -345,7 +344,7 @@ def text_of(answers: Answers) -> str:
         "robot.toml.j2",
         answers=answers,
         kind=kind,
-        what=KINDS[kind.name],
+        what=kind.text,
         buses=[answers["bus"], answers.get("bus_2")][: kind.buses],
         axes=axes,
         angle_deg=math.degrees(answers.get("angle_deg", 0.0)),

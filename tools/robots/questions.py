@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,6 +29,8 @@ KINDS = {
     "spatial-8": "a platform in space, 8 cables from above and below: stiffest",
 }
 """Description, and reason for the number of cables, by the kind's name."""
+SEVEN_CABLES = {"suspended-7": "suspended-8", "spatial-7": "spatial-8"}
+"""Kinds of imported models, and the kinds whose last cable they lack."""
 SKETCH = r"""
 planar-3       planar-4       point-4        suspended-6, -8   spatial-8
 o         o    o         o    o         o    o  o     o  o     o  o     o  o
@@ -54,6 +56,11 @@ class RobotKind:
     name: str
     robot: Robot
     platform: Platform
+
+    @property
+    def text(self) -> str:
+        """Its description."""
+        return KINDS.get(self.name) or f"{KINDS[SEVEN_CABLES[self.name]]}; without one of them"
 
     @property
     def cables(self) -> int:
@@ -144,10 +151,18 @@ def _side_by_side(corner: FloatArray, beside: FloatArray) -> FloatArray:
 
 
 def kind_of(name: str) -> RobotKind:
-    """Return the kind of this name, which must be in KINDS."""
-    robot = load_robot(name)
-    assert robot.platform is not None
-    return RobotKind(name, robot, robot.platform)
+    """Return the kind of this name, which must be in KINDS or SEVEN_CABLES."""
+    robot = load_robot(SEVEN_CABLES.get(name, name))
+    platform = robot.platform
+    assert platform is not None
+    if name in SEVEN_CABLES:
+        robot = replace(robot, axes=robot.axes[:-1])
+        platform = replace(
+            platform,
+            exit_points_m=platform.exit_points_m[:-1],
+            anchor_points_m=platform.anchor_points_m[:-1],
+        )
+    return RobotKind(name, robot, platform)
 
 
 Answers = dict[str, Any]
@@ -207,7 +222,7 @@ def kind_question() -> Question:
     """Return the first question, on which all others depend."""
 
     def read(text: str, _: Answers) -> RobotKind:
-        if text not in KINDS:
+        if text not in KINDS | SEVEN_CABLES:
             raise AnswerError(f"allowed: {', '.join(KINDS)}")
         return kind_of(text)
 

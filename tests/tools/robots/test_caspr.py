@@ -120,6 +120,31 @@ def test_targets_are_not_turned_unless_the_angle_is_given(tmp_path: Path) -> Non
     assert platform.workspace_angle_rad == pytest.approx(np.radians(3.0), rel=1e-4)
 
 
+def test_a_model_with_seven_cables_has_seven_axes_on_two_buses(tmp_path: Path) -> None:
+    shipped = load_robot("spatial-8").platform
+    assert shipped is not None
+    ends = zip(shipped.exit_points_m[:7], shipped.anchor_points_m, strict=False)
+    each = "".join(
+        CABLE.format(
+            number=number, reference="joint", least=1.0, most=150.0,
+            exit=" ".join(map(str, exit_m)), anchor=" ".join(map(str, anchor_m)),
+        )
+        for number, (exit_m, anchor_m) in enumerate(ends, start=1)
+    )  # fmt: skip
+    bodies = BODIES.replace("PLANAR_XZ", "SPATIAL_EULER_XYZ").replace("2.5<", "10<")
+    bodies = re.sub(r">[^<> ]+ [^<> ]+ [^<> ]+<", ">0 0 0<", bodies)
+    *_, output, path = imported(
+        tmp_path, bodies, f'<cables><cable_set id="only">{each}</cable_set></cables>'
+    )
+    assert path.exists(), output
+    assert "Traceback" not in output
+    robot = load_robot(path)
+    assert [axis.node_id for axis in robot.axes] == [1, 2, 3, 4, 5, 6, 7]
+    assert len(robot.buses) == 2
+    assert robot.platform is not None
+    assert robot.platform.exit_points_m == shipped.exit_points_m[:7]
+
+
 def test_attachments_may_refer_to_the_centre_of_mass(tmp_path: Path) -> None:
     *_, path = imported(tmp_path, cables=cables(reference="com"))
     platform = load_robot(path).platform
