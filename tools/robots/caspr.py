@@ -107,7 +107,7 @@ class ModelAnswers:
 
 
 def kind_of_points(exits_m: FloatArray, anchors_m: FloatArray, file: Path) -> str:
-    """Return the kind with this number of cables; raises BadInputError if there is none."""
+    """Return the kind with this number of cables; raises BadInputError for other numbers."""
     count, size = exits_m.shape
     heights = exits_m[:, -1]
     is_point = not np.ptp(anchors_m, axis=0).any()
