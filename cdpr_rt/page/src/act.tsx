@@ -1,5 +1,5 @@
 // What acts: the stop, the next step, moves and jogging.
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { linkTo } from "./address";
 import { clientName, command, hasKey, request, setKey, stop as order } from "./daemon";
 import { beginTarget, useHindrance } from "./move";
@@ -86,13 +86,22 @@ function beginMove(): void {
   setTimeout(() => document.querySelector<HTMLInputElement>(".target input")?.focus(), SHOWN_MS);
 }
 
-/** The state, its cause and the one next step: the head of every view. */
+/**
+ * The state, its cause and the one next step: the head of every view.
+ *
+ * After a step that was taken by the keyboard, the next one is in focus.
+ */
 export function NextStep() {
   useStore();
   const { tone, title, detail, next } = useSituation();
   const [working, setWorking] = useState(false);
-  const settled = useSettled(next), free = useHindrance() === "";
-  const press = async (step: Exclude<Step, "move">): Promise<void> => {
+  const settled = useSettled(next), free = useHindrance() === "", waits = working || !settled;
+  const button = useRef<HTMLButtonElement>(null), byKey = useRef(false);
+  useEffect(() => {
+    if (byKey.current && document.activeElement === document.body) button.current?.focus();
+  }, [next]);
+  const press = async (step: Exclude<Step, "move">, detail: number): Promise<void> => {
+    byKey.current = detail === 0;
     setWorking(true);
     await store.attempt(STEPS[step]);
     setWorking(false);
@@ -103,8 +112,8 @@ export function NextStep() {
         <h1 aria-live="polite">{title}</h1>
         {detail && <p>{detail}</p>}
       </div>
-      {next === "move" && hasKey() && free && <button class="next" onClick={beginMove}>{STEP_LABELS[next]}</button>}
-      {next && next !== "move" && hasKey() && <button class="next" disabled={working || !settled} onClick={() => void press(next)}>{STEP_LABELS[next]}</button>}
+      {next === "move" && hasKey() && free && <button ref={button} class="next" onClick={beginMove}>{STEP_LABELS[next]}</button>}
+      {next && next !== "move" && hasKey() && <button ref={button} class="next" aria-disabled={waits} onClick={({ detail }) => waits || void press(next, detail)}>{STEP_LABELS[next]}</button>}
       {!hasKey() && <Key />}
     </section>
   );

@@ -59,7 +59,7 @@ export interface Cycle {
 
 const FIELDS = "time_s,tension_N,tension_measured,pose,pose_setpoint";
 const RATE_Hz = 30;
-const RETRY_MS = 1000;
+const RETRY_MS = 1000, RETRY_WITHOUT_KEY_MS = 10_000;
 const SILENT_MS = 4000;
 const UNAUTHORIZED = 401;
 
@@ -169,7 +169,7 @@ export function follow(listener: LiveListener): void {
         // tried again below
       }
       listener.connected(false);
-      await new Promise((resume) => setTimeout(resume, RETRY_MS));
+      await new Promise((resume) => setTimeout(resume, key ? RETRY_MS : RETRY_WITHOUT_KEY_MS));
     }
   })();
 }
