@@ -22,6 +22,30 @@ class WorkFailedError(CommandError):
     """The work was started and failed: a drive fault, a limit, a lost bus."""
 
 
+class NoDaemonError(WorkFailedError):
+    """No daemon answers."""
+
+
+class ConnectionLostError(NoDaemonError):
+    """The connection ended before the answer."""
+
+
+class UnansweredError(NoDaemonError):
+    """The answer has not arrived in time."""
+
+
+class CrowdedError(NoDaemonError):
+    """The daemon has too many connections and has not read the request."""
+
+
+class ServiceRefusalError(WorkFailedError):
+    """The service has refused a command, for example because another client may move the robot."""
+
+
+class LoopEndedError(WorkFailedError):
+    """The daemon's control loop has ended."""
+
+
 class BadInputError(CommandError):
     """The command cannot start: a wrong argument, file, profile or bus."""
 

@@ -70,11 +70,11 @@ class RightInBusTime:
         self.number = 0
         """The number of the newest grant to this process, which commands carry."""
         self._renewed_ns = 0
-        self.lease = Lease(PublishedRight(block), clock_ns)
+        self.lease = Lease(PublishedRight(block), self._heard_ns)
 
     def take(self, client: str) -> str:
         """Take the right and keep it; return the token. Raises LeaseError if another has it."""
-        self.token = self.lease.take(client, _TTL_S)
+        self.token, self._renewed_ns = self.lease.take(client, _TTL_S), self._clock_ns()
         self._renew(self.token)
         return self.token
 
@@ -89,13 +89,21 @@ class RightInBusTime:
         self.token = None
 
     def look(self) -> None:
-        """Renew the right if that is due; called every cycle."""
-        if self.token is not None and self._clock_ns() - self._renewed_ns >= _RENEWED_NS:
+        """Renew the right as often as is due; called every cycle.
+
+        More than its duration may have passed since the last cycle, as in a boot.
+        """
+        while self.token is not None and self._clock_ns() - self._renewed_ns >= _RENEWED_NS:
             self._renew(self.token)
 
     def _renew(self, token: str) -> None:
-        self._renewed_ns = self._clock_ns()
+        self._renewed_ns = self._heard_ns()
         self.number = self.lease.renew(token).number
+
+    def _heard_ns(self) -> int:
+        """Return the time now, at most until the next renewal while the right is kept."""
+        now_ns = self._clock_ns()
+        return now_ns if self.token is None else min(now_ns, self._renewed_ns + _RENEWED_NS)
 
 
 # A set-point stream in bus time: packets as on the wire, received as by the daemon.

@@ -103,7 +103,7 @@ def test_ctrl_c_leaves_no_process(tmp_path: Path) -> None:
     )
     work = keep / "run-1" / "files"
     wait_until((work / "begun").exists)
-    assert len(processes_of(work)) == 3
+    wait_until(lambda: len(processes_of(work)) == 3)  # a shell, its child and the sleep
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=SLOW_S)
     assert process.returncode == 1 and "cdpr: stopped on request, in run 1" in told

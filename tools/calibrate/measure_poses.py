@@ -24,9 +24,8 @@ from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.states import EMERGENCY_STOP
 from cdpr_rt.errors import TripError
 from cdpr_rt.robot import Error, Faulted, MotionEnded, Refused, Robot, end_text
-from cdpr_tools.client.client import ServiceRefusalError
 from cdpr_tools.client.handle_errors import command_error
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, ServiceRefusalError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.trials.directions import Directions, platform_of
 

@@ -33,7 +33,17 @@ from cdpr_tools.daemon.paths import (
     is_trusted,
 )
 from cdpr_tools.daemon.settings import read_key
-from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.errors import (
+    BadInputError,
+    CommandError,
+    ConnectionLostError,
+    CrowdedError,
+    LoopEndedError,
+    NoDaemonError,
+    ServiceRefusalError,
+    UnansweredError,
+    WorkFailedError,
+)
 from cdpr_tools.output import Output
 
 _CONNECT_S, _ANSWER_S = 5.0, 70.0
@@ -41,30 +51,6 @@ _BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
 _LEASE_S = 2.0
 _STOP_WAIT_S: Final = {"/hold": 3.0, "/disable": 30.0, "/shutdown": 30.0}
 _STOP_TRIES, _STOP_AGAIN_S = 50, 0.02
-
-
-class NoDaemonError(WorkFailedError):
-    """No daemon answers."""
-
-
-class ConnectionLostError(NoDaemonError):
-    """The connection ended before the answer."""
-
-
-class UnansweredError(NoDaemonError):
-    """The answer has not arrived in time."""
-
-
-class CrowdedError(NoDaemonError):
-    """The daemon has too many connections and has not read the request."""
-
-
-class ServiceRefusalError(WorkFailedError):
-    """The service has refused a command, for example because another client may move the robot."""
-
-
-class LoopEndedError(WorkFailedError):
-    """The daemon's control loop has ended."""
 
 
 class Daemon:

@@ -10,7 +10,7 @@ from typing import Any
 
 from cdpr_rt.core.shared_block import SharedBlockError
 from cdpr_rt.service.link import STARTING
-from cdpr_tools.client.client import Daemon, NoDaemonError
+from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.status_text import (
     DEAD,
     ProgressNotes,
@@ -26,7 +26,7 @@ from cdpr_tools.daemon.estop import (
     status_in_memory,
 )
 from cdpr_tools.daemon.loop_file import LoopFile
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.errors import NoDaemonError, WorkFailedError
 from cdpr_tools.output import Output
 
 _WATCH_S = 0.2

@@ -37,19 +37,12 @@ from cdpr_rt.robot import (
 )
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSession
-from cdpr_tools.client.client import (
-    Daemon,
-    NoDaemonError,
-    answers,
-    await_start,
-    is_starting,
-    open_daemon,
-)
+from cdpr_tools.client.client import Daemon, answers, await_start, is_starting, open_daemon
 from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.handle_errors import errors_for_scripts, robot_errors
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.composition.fault_injection import fault_access
-from cdpr_tools.errors import BAD_INPUT, CommandError
+from cdpr_tools.errors import BAD_INPUT, CommandError, NoDaemonError
 from cdpr_tools.output import Output
 from cdpr_tools.processes import module_command
 from cdpr_tools.streams import procedure_token

@@ -17,16 +17,18 @@ from cdpr_rt.errors import (
     TripError,
 )
 from cdpr_rt.robot import Error, Faulted, InvalidArgument, InvalidRobot, NotRunning, Refused
-from cdpr_tools.client.client import (
+from cdpr_tools.client.refusals import DaemonRefusalError
+from cdpr_tools.errors import (
+    BadInputError,
+    CommandError,
     ConnectionLostError,
     CrowdedError,
     LoopEndedError,
     NoDaemonError,
     ServiceRefusalError,
     UnansweredError,
+    WorkFailedError,
 )
-from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 

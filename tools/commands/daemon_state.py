@@ -12,7 +12,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
-from cdpr_tools.client.client import Daemon, NoDaemonError, live_sockets, open_daemon
+from cdpr_tools.client.client import Daemon, live_sockets, open_daemon
 from cdpr_tools.client.daemon_end import end_daemon
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.motion import where_text
@@ -28,7 +28,7 @@ from cdpr_tools.commands.options import option
 from cdpr_tools.commands.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.estop import end_leftover_processes
-from cdpr_tools.errors import CommandError, WorkFailedError
+from cdpr_tools.errors import CommandError, NoDaemonError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 

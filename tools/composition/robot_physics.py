@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles import Robot, Winch
+from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
 from cdpr_sim_bus.canopen.store import StoreError
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
@@ -152,13 +153,14 @@ def physics_of(
 ) -> tuple[CableRobot | None, Sequence[Plant]]:
     """Return the body that all axes move, or None, and the plant of each motor.
 
-    Raises BadInputError if the plant file does not fit the robot.
+    Raises BadInputError if the plant file cannot be used or does not fit the robot.
     """
     n, platform = len(robot.axes), robot.platform
-    if platform is None:
-        one = Plant.load_file(plant)
-        return None, [one.model_copy(update={"seed": (one.seed + i) % 2**32}) for i in range(n)]
-    whole = RobotPlant.load_file(plant)
+    with raised_as(BadInputError, ProfileError):
+        if platform is None:
+            one = Plant.load_file(plant)
+            return None, [one.model_copy(update={"seed": (one.seed + i) % 2**32}) for i in range(n)]
+        whole = RobotPlant.load_file(plant)
     try:
         whole.require_fit(n, len(platform.home_m))
         motors = whole.motor_plants(n, [axis.winch for axis in robot.axes])

@@ -23,10 +23,9 @@ from cdpr_tools.calibrate.daemon_run import going_on
 from cdpr_tools.calibrate.measure_poses import PoseOperator, StoredPoses
 from cdpr_tools.calibrate.places import Places
 from cdpr_tools.calibrate.run import read_places
-from cdpr_tools.client.client import ConnectionLostError
 from cdpr_tools.client.daemon_robot import commanded
 from cdpr_tools.client.refusals import DaemonRefusalError
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, ConnectionLostError, WorkFailedError
 from cdpr_tools.output import Output
 from tests.profiles.test_geometry_calibration import calibration
 from tests.tools.calibrate.test_daemon_pose import ROBOT, StandingDaemon, kept_in, read

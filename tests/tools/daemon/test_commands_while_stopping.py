@@ -19,12 +19,11 @@ from typer.testing import CliRunner
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_rt.service.link import ENDED
 from cdpr_tools.client import daemon_end
-from cdpr_tools.client.client import NoDaemonError, ServiceRefusalError
 from cdpr_tools.client.motion import carry_out
 from cdpr_tools.client.refusals import DaemonRefusalError
 from cdpr_tools.commands import daemon_state, with_daemon
 from cdpr_tools.daemon.loop_file import LoopFile, started
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.errors import NoDaemonError, ServiceRefusalError, WorkFailedError
 from cdpr_tools.output import Output
 
 LOOP = """

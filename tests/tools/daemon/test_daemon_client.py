@@ -19,17 +19,10 @@ import pytest
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_tools.cli import main
-from cdpr_tools.client.client import (
-    ConnectionLostError,
-    Daemon,
-    NoDaemonError,
-    axis_values,
-    key_values,
-    open_daemon,
-)
+from cdpr_tools.client.client import Daemon, axis_values, key_values, open_daemon
 from cdpr_tools.commands.path import robot_by_name
 from cdpr_tools.daemon.loop_file import LauncherLock
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, ConnectionLostError, NoDaemonError
 from tests.cdpr_here import cdpr_here
 
 

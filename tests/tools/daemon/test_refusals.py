@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
-from cdpr_tools.client.client import CrowdedError, ServiceRefusalError, open_daemon
+from cdpr_tools.client.client import open_daemon
 from cdpr_tools.client.refusals import DaemonRefusalError, in_typed_words
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, CrowdedError, ServiceRefusalError, WorkFailedError
 
 WHY = {"why": "on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1"}
 RANGE = {"index": 1, "low": -1.0, "high": 1.0}

@@ -17,9 +17,10 @@ from pathlib import Path
 import pytest
 from typing_extensions import override
 
-from cdpr_tools.client.client import NoDaemonError, await_socket, open_daemon
+from cdpr_tools.client.client import await_socket, open_daemon
 from cdpr_tools.daemon.loop_file import LauncherLock, launcher_loads, launcher_pid, started
 from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
+from cdpr_tools.errors import NoDaemonError
 from cdpr_tools.output import Output
 from tests.cdpr_here import cdpr_here
 
