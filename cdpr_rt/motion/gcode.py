@@ -42,9 +42,10 @@ _TURN_rad: Final = 1e-9
 
 
 def arc_by_centre(start: FloatArray, end: FloatArray, centre: FloatArray, clockwise: bool) -> Arc:
-    """Return the arc (2,) around a centre; the whole circle if it ends where it begins.
+    """Return the arc (2,) around a centre; the whole circle if it ends in the direction in which it
+    begins.
 
-    The centre is moved by the rounding error of the file, to the same distance from both ends.
+    Both ends may have slightly different distances from the centre, due to rounding in the file.
     Raises ValueError if the distances differ by more.
     """
     first, last = start - centre, end - centre
@@ -56,15 +57,11 @@ def arc_by_centre(start: FloatArray, end: FloatArray, centre: FloatArray, clockw
             f"its ends are {1e3 * r:.4f} mm and {1e3 * other:.4f} mm from its centre; "
             "allowed: equal distances"
         )
-    chord = end - start
-    length = float(np.hypot(*chord))
-    if length < _NOTHING_m:
-        return Arc(centre.copy(), -math.tau if clockwise else math.tau)
-    middle = 0.5 * (start + end)
-    normal = np.array([-chord[1], chord[0]]) / length
-    centre = middle + float((centre - middle) @ normal) * normal
-    angle = _turn(start - centre, end - centre)
-    return Arc(centre, angle % math.tau - math.tau if clockwise else angle % math.tau)
+    angle = _turn(last, first) if clockwise else _turn(first, last)
+    if abs(angle) * r < _NOTHING_m:
+        angle = 0.0
+    angle = angle % math.tau or math.tau
+    return Arc(centre.copy(), -angle if clockwise else angle)
 
 
 def arc_by_radius(start: FloatArray, end: FloatArray, radius: float, clockwise: bool) -> Arc:

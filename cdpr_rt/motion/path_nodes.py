@@ -37,8 +37,9 @@ _PROJECTIONS: Final = 3
 class Pieces:
     """m lines and arcs, one after the other.
 
-    Piece i runs from `start[i]` along `way[i]`. If `angle_rad[i]` is not 0, its position turns by
-    that angle around an axis instead and moves evenly along the axis.
+    Piece i runs from `start[i]` along `way[i]`. If `angle_rad[i]` is not 0, its position also turns
+    by that angle around an axis. Its way is then along the axis, and to the end in the file if that
+    is not quite on the circle.
     """
 
     start: FloatArray
@@ -86,11 +87,8 @@ class Pieces:
             turned = (share[round_] * self.angle_rad[j])[:, None]
             rate = (self.angle_rad[j] / self.length[j])[:, None]
             c, s = np.cos(turned), np.sin(turned)
-            rise = np.einsum("ij,ij->i", normal[:, :k], self.way[j, :k])[:, None] * normal
-            # c - 1 without rounding errors of large arms
-            out = s * side - 2.0 * np.sin(0.5 * turned) ** 2 * arm
-            q[round_, :k] = self.start[j, :k] + (out + share[round_, None] * rise)[:, :k]
-            first[round_, :k] = (rate * (c * side - s * arm) + rise / length[round_])[:, :k]
+            q[round_, :k] += _moved_around(arm, normal, turned)[:, :k]
+            first[round_, :k] += (rate * (c * side - s * arm))[:, :k]
             second[round_, :k] = (-(rate**2) * (c * arm + s * side))[:, :k]
         return q, first, second
 
@@ -120,6 +118,12 @@ class Pieces:
         return np.asarray(np.clip(share, 0.0, 1.0))
 
 
+def _moved_around(arm: FloatArray, normal: FloatArray, angle: FloatArray | float) -> FloatArray:
+    """Return the movement (..., 3) of the end of an arm that turns around an axis."""
+    # 1 - cos without rounding errors of large arms
+    return np.asarray(np.sin(angle) * np.cross(normal, arm) - 2.0 * np.sin(0.5 * angle) ** 2 * arm)
+
+
 def pieces_of(path: PathDescription, scale: FloatArray) -> Pieces:
     """Return the pieces of a path; `scale` (d,) is the length in m for a unit of each coordinate.
 
@@ -132,13 +136,11 @@ def pieces_of(path: PathDescription, scale: FloatArray) -> Pieces:
     for move in path.moves:
         arc = move.arc
         way = move.end - here
-        square = float(((scale * way) ** 2).sum())
         angle, arm, normal = 0.0, np.zeros(3), np.zeros(3)
         if arc is not None:
             angle, normal, arm = arc.angle_rad, arc.normal, arc.arm_m(here[:k])
-            flat = float(way[:k] @ way[:k]) - float(way[:k] @ normal[:k]) ** 2
-            square += angle**2 * float(arm @ arm) - flat
-        length = float(np.sqrt(max(square, 0.0)))
+            way[:k] -= _moved_around(arm, normal, angle)[:k]
+        length = float(np.hypot(np.linalg.norm(scale * way), angle * np.linalg.norm(arm)))
         if length > _NOTHING_m:
             kept.append(
                 (here, way, arm, normal, angle, length, move.speed, move.line, move.blend_m)

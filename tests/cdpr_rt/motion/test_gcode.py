@@ -368,6 +368,26 @@ def test_a_rotation_given_in_the_room_is_one_rotation_also_in_a_turned_file():
     np.testing.assert_allclose(path.moves[-1].end[3:], [math.radians(5.0), 0, 0], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("to", "turn_deg"),
+    [
+        ("X10.0004 Y0", 360.0),  # rounded ends of a whole circle
+        ("X10.0004 Y-0.0001", 359.999),
+        ("X10.0005 Y-0.01", 359.885),
+        ("X9.9995 Y0.01", 0.115),
+    ],
+)
+def test_rounding_of_an_arcs_end_does_not_move_the_arc(to, turn_deg):
+    path = read("G61", "G0 X10 Y0 Z0", f"G3 {to} I-5 J0 F600", "M2")
+    assert path.moves[0].arc is not None
+    np.testing.assert_allclose(np.degrees(path.moves[0].arc.angle_rad), turn_deg, atol=2e-3)
+    nodes = nodes_of(path, np.ones(6))
+    for share in (0.0, 0.3, 0.7):
+        radius = np.linalg.norm(nodes.between(share)[:, :2] - [5e-3, 0.0], axis=1)
+        np.testing.assert_allclose(radius, 5e-3, atol=1e-6)
+    np.testing.assert_allclose(nodes.q[-1], path.moves[0].end, atol=1e-12)
+
+
 def test_a_rejected_arc_names_the_other_kind_of_centre_if_that_fits():
     lines = ("G0 X-40 Y50 Z0", "{} G3 X-30 Y40 I{} J{} F60", "M2")
     for code, i, j, hint in (("G91.1", -40, 40, "G90.1"), ("G90.1", 0, -10, "G91.1")):
