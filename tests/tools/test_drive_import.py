@@ -334,6 +334,14 @@ def test_pdo_maps_are_proposed_if_the_defaults_do_not_suffice(tmp_path: Path) ->
     assert any("step J" in one["how"] for one in told["unknown"])
 
 
+def test_empty_places_after_a_pdo_map_do_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "compact.eds"
+    path.write_text(with_key("1A00sub0", "DefaultValue", "8", TEXT))
+    told = imported(path, tmp_path / "out")
+    assert load_drive(tmp_path / "out" / "compact.toml").tpdos == GENERIC.tpdos
+    assert told["facts"]["tpdos"]["status"] == "manual"
+
+
 def test_small_fixed_pdo_maps_are_combined(tmp_path: Path) -> None:
     text = TEXT
     for number, entries in enumerate((["0x60410010"], ["0x60640020"], ["0x60770010"], [])):

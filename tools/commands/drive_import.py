@@ -669,6 +669,8 @@ def _entries(eds: DataSheet, mapping: int) -> tuple[_Entry, ...]:
     entries = []
     for sub in range(1, min(count, _MOST_ENTRIES) + 1):
         value = _number(eds, mapping, sub) or 0
+        if not value:  # CompactSubObj counts all places of a map
+            break
         index, of, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
         mapped = eds.get(index, of)
         if mapped is None or bits_of(mapped) != bits or bits not in (8, 16, 32):

@@ -30,7 +30,7 @@ MOST_BYTES: Final = 1 << 28
 """Largest size of a recording by another program."""
 _Row = tuple[int, list[str]]
 """Number of a line in the file, and its cells."""
-_DELIMITERS: Final = (",", ";", "\t")
+_DELIMITERS: Final = (",", ";", "\t", "|")
 _SAMPLE_LINES: Final = 50
 _OPTITRACK: Final = "Format Version"
 _VICON: Final = ("Objects", "Segments", "Trajectories", "Joints", "Model Outputs")
@@ -49,6 +49,7 @@ _UNITS: Final = frozenset((
     "deg/s", "rpm", "hz",
 ))  # fmt: skip
 """Units in a line below the names, in lower case."""
+_UNIT_IN_NAME: Final = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]$")
 _QUATERNION: Final = "Quaternion"
 _LENGTHS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
@@ -186,8 +187,8 @@ def _is_number(cell: str) -> bool:
 def _read_csv(path: Path, rows: Iterator[_Row], digest: str, comment: str) -> Table:
     """Read a CSV file: a line of names, perhaps one of units, and rows of numbers.
 
-    Other lines may stand above. Without a line of names, a comment above the numbers may contain
-    them.
+    Names may end with a unit in brackets. Other lines may stand above. Without a line of names, a
+    comment above the numbers may contain them.
     """
     head: list[list[str]] = []
     first: _Row | None = None
@@ -195,7 +196,8 @@ def _read_csv(path: Path, rows: Iterator[_Row], digest: str, comment: str) -> Ta
         cells = _cells(row)
         numbers = sum(map(_is_number, cells))
         alike = any(len(above) == len(cells) for above in head)
-        if 2 * numbers > len(cells) or (numbers and alike):
+        is_fact = len(cells) == 2 and cells[0][:1].isalpha()  # such as Rate,1000
+        if 2 * numbers > len(cells) or (numbers and alike and not is_fact):
             first = line, row
             break
         head.append(cells)
@@ -216,6 +218,10 @@ def _read_csv(path: Path, rows: Iterator[_Row], digest: str, comment: str) -> Ta
         if len(names) != width:
             problem = "no line of names above the numbers; write one, such as time_s,angle,torque"
             raise ProfileError(path, f"line {first[0]}", problem)
+    for name in names if not units else ():
+        unit = _UNIT_IN_NAME.search(name)
+        if unit is not None and unit[1].lower() in _UNITS:
+            units[name] = unit[1]
     return _table(path, digest, names, chain([first], rows), units)
 
 

@@ -162,6 +162,8 @@ def test_a_qualisys_rotation_matrix_becomes_a_rotation_vector(tmp_path: Path) ->
         "Recording of 3 May, 2026\nRate;100 Hz\n\nt;a\n0;1,0\n1;2,0\n",
         "t,a\n[s],[Nm]\n0,1\n1,2\n",
         "t,a,state\n0,1,RUN\n1,2,STOP\n",
+        "Operator,Ada\nRate,1000\nGain,2\nt,a\n0,1\n1,2\n",
+        "t|a\n0|1.0\n1|2.0\n",
     ],
 )
 def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -> None:
@@ -173,6 +175,11 @@ def test_csv_dialects_give_the_same_columns(tmp_path: Path, text: str | bytes) -
 def test_a_line_of_units_states_the_units(tmp_path: Path) -> None:
     table = read_table(written(tmp_path, "time,pos,iq\ns,deg,A_rms\n0,1,2\n"))
     assert table.units == {"time": "s", "pos": "deg", "iq": "A_rms"}
+
+
+def test_units_in_brackets_after_the_names_are_used(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, "time [ms],pos (deg),x (left),iq\n0,1,2,3\n"))
+    assert table.units == {"time [ms]": "ms", "pos (deg)": "deg"}
 
 
 def test_texts_for_missing_numbers_are_empty_cells(tmp_path: Path) -> None:
