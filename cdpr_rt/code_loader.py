@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from cdpr_profiles.bounded_input import path_of, read_bytes, resolved
 from cdpr_profiles.errors import ProfileError
-from cdpr_rt.errors import ControlError
+from cdpr_rt.errors import ControlError, error_text
 from cdpr_rt.state_file import read_state, state_path, write_state
 
 _MOST_BYTES: Final = 1 << 22
@@ -40,7 +40,7 @@ def load_code(reference: str) -> Any:
         raise
     except (Exception, SystemExit) as error:  # the user's code may raise anything
         raise CodeError(
-            f"{reference}: {type(error).__name__}: {error}; give FILE.py:NAME or MODULE:NAME"
+            f"{reference}: {error_text(error)}; give FILE.py:NAME or MODULE:NAME"
         ) from error
 
 
@@ -77,7 +77,7 @@ def _loaded(point: Any) -> Any:
     except (Exception, SystemExit) as error:
         package = "" if point.dist is None else f" of the package {point.dist.name}"
         raise CodeError(
-            f"{point.name}{package}: {type(error).__name__}: {error}; repair or uninstall it"
+            f"{point.name}{package}: {error_text(error)}; repair or uninstall it"
         ) from error
 
 
@@ -102,7 +102,7 @@ def load_allowed(reference: str, folder: Path) -> Any:
     try:
         return _member(_run(file, source), reference.rpartition(":")[2])
     except (Exception, SystemExit) as error:
-        raise CodeError(f"{reference}: {type(error).__name__}: {error}") from error
+        raise CodeError(f"{reference}: {error_text(error)}") from error
 
 
 def _allowed_source(reference: str, folder: Path, *, allow: bool) -> tuple[Path, bytes]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -47,14 +47,11 @@ def load(
             raise InvalidRobot(f"{profile.path}: the robot has no platform; add a [platform] table")
         if allow_code:
             require_code_allowed(profile, allow_code=True)
-        own = tension_distribution
-        if own is not None:
-            checked_distribution("tension_distribution", own)
-        return Model(
-            platform_model_of(profile),
-            [axis.name for axis in profile.axes],
-            lambda: own or named_distribution(profile),
-        )
+        model, cables = platform_model_of(profile), [axis.name for axis in profile.axes]
+        made = Model(model, cables, partial(named_distribution, profile))
+        if tension_distribution is not None:
+            made._distribution = checked_distribution("tension_distribution", tension_distribution)
+        return made
     except CodeError as error:
         raise InvalidArgument(str(error)) from None
     except (ProfileError, ControlError) as error:
@@ -80,7 +77,7 @@ class Model:
     ) -> None:
         """Take the platform's model, the cable names, and a loader of the distribution."""
         self._model = model
-        self._own_distribution = cache(own_distribution)
+        self._own_distribution = own_distribution
         self.cables = cables
         """Names of the n cables."""
 
@@ -246,7 +243,7 @@ class Model:
         moment = acting[:, 3:] - np.cross(self._centres_m(rows), acting[:, :3])
         try:
             found, carried = self._model.planned_tensions(
-                self._model.poses(rows), self._reduced(force, moment), self._own_distribution()
+                self._model.poses(rows), self._reduced(force, moment), self._distribution
             )
         except ProfileError as error:
             raise InvalidRobot(str(error)) from None
@@ -271,6 +268,10 @@ class Model:
     def is_feasible(self, position: ArrayLike, acceleration_m_s2: float = 0.0) -> BoolArray:
         """Return whether tensions within the bounds can hold the platform, (...)."""
         return np.asarray(self.capacity_margin(position, acceleration_m_s2) >= 0.0)
+
+    @cached_property
+    def _distribution(self) -> TensionDistribution | None:
+        return self._own_distribution()
 
     def _weight_N(self) -> FloatArray:
         weight = np.zeros(3)

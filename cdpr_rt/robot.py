@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Protocol, Self, cast
+from typing import Any, Final, Never, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -237,6 +237,9 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}>"
+
+    def __reduce__(self) -> Never:
+        raise TypeError("a Robot cannot be copied or pickled; open it in the process that uses it")
 
     def close(self) -> None:
         """Release the robot.

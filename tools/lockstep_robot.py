@@ -232,7 +232,7 @@ class LockstepRobot:
         self._limits = limits_of(self.robot, calibration_in_doubt=calibration_in_doubt)
         self._stack = ExitStack()
         self._turns = self._status_seen = self._began = 0
-        self._closed = False
+        self._closed, self._in_use = False, threading.Lock()
         self.simulator: LocalSimulator
         self.description: Mapping[str, Any]
         """The description that the daemon would publish."""
@@ -615,8 +615,16 @@ class LockstepRobot:
     @contextmanager
     def _for_script(self) -> Iterator[None]:
         self._require_open()
-        with errors_for_scripts(), _interrupts_deferred():
-            yield
+        if not self._in_use.acquire(blocking=False):
+            raise Error(
+                "another thread, or a controller or program, uses this handle now; use it from one "
+                "thread, outside of your controller"
+            )
+        try:
+            with errors_for_scripts(), _interrupts_deferred():
+                yield
+        finally:
+            self._in_use.release()
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from cdpr_rt.core.fault import (
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.core.states import ALLOWED, LoopState, Reaction, Transition
 from cdpr_rt.core.supervisor import Supervisor, Suspects, no_suspects
-from cdpr_rt.errors import ControlError
+from cdpr_rt.errors import ControlError, error_text
 from cdpr_rt.jit import bound, copy_bytes, jit
 from cdpr_rt.loop.machine import Machine
 from cdpr_rt.loop.right import RightToMove
@@ -425,7 +425,7 @@ class Engine:
             torque[:] = np.nan
             self.program_fault = Fault(
                 Limit.NOT_FINITE, code=PROGRAM, source=f"program {program.name}",
-                detail=f"{type(error).__name__}: {error}"[:_MOST_OF_AN_ERROR],
+                detail=error_text(error)[:_MOST_OF_AN_ERROR],
             )  # fmt: skip
         self.program_s = machine.clock.now_s - came_s
         self.asked_Nm[:] = torque

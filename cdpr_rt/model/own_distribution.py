@@ -13,7 +13,7 @@ from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.platform import DISTRIBUTIONS
 from cdpr_rt.arrays import FloatArray, read_only, real_array
 from cdpr_rt.code_loader import CodeError, load_allowed, load_registered_one, require_allowed
-from cdpr_rt.errors import ControlError
+from cdpr_rt.errors import ControlError, error_text
 from cdpr_rt.jit import jit
 
 TensionDistribution = Callable[
@@ -115,7 +115,7 @@ class OwnDistribution:
         try:
             found = self._function(*given)
         except (Exception, SystemExit) as error:  # the latter must not end the loop's process
-            raise self._error(f"{type(error).__name__}: {error}") from error
+            raise self._error(error_text(error)) from error
         try:
             t = np.ascontiguousarray(real_array(found))
         except (TypeError, ValueError):

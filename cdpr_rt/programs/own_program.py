@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from cdpr_rt.arrays import FloatArray, real_array
 from cdpr_rt.code_loader import CodeError
+from cdpr_rt.errors import error_text
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.motion.trajectory import stopping_position
 from cdpr_rt.programs.base import CommandArguments, ProgramError
@@ -120,7 +121,7 @@ class OwnProgram(PoseProgram):
             run.begin(start.copy(), **values)
             first = self._position_of(run.target(0.0), start)
         except (Exception, SystemExit) as error:  # the user's code may raise anything
-            raise ProgramError(f"{self.name}: {type(error).__name__}: {error}") from error
+            raise ProgramError(f"{self.name}: {error_text(error)}") from error
         if first is None:
             raise ProgramError(f"{self.name}: it has no target at time 0")
         if why_not := self._why_not(first):
@@ -164,7 +165,7 @@ class OwnProgram(PoseProgram):
         try:
             goal = self._position_of(self._run.target(self._time_s), self._goal)
         except (Exception, SystemExit) as error:  # user code must not end the loop's process
-            self._end(f"at {self._time_s:.3f} s: {type(error).__name__}: {error}")
+            self._end(f"at {self._time_s:.3f} s: {error_text(error)}")
             return
         if goal is None:
             self._runs = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -29,6 +31,13 @@ def test_jacobian_is_the_derivative_of_the_lengths(name: str) -> None:
     lengths = model.lengths(q[:, None] + change) - model.lengths(q[:, None] - change)
     expected = np.swapaxes(lengths / (2.0 * step), -1, -2)
     assert model.jacobian(q) == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_model_can_be_sent_to_another_process() -> None:
+    model = cdpr.load("planar-4")
+    there = pickle.loads(pickle.dumps(model))
+    q = positions(model, 3)
+    np.testing.assert_array_equal(there.tensions(q), model.tensions(q))
 
 
 @pytest.mark.parametrize("name", ROBOTS)

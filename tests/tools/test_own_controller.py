@@ -131,7 +131,7 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) 
             (infinite, r"PoseController.update returned \[nan nan nan\]; return 3 finite tensions"),
             (imaginary, r"j\s*\]; return 3 finite tensions in N"),
             (leaving, "SystemExit: enough"),
-            (division, "ZeroDivisionError: no way on"),
+            (division, r"ZeroDivisionError: no way on \(test_own_controller.py:\d+\)"),
         ):
             mine.failing = None
             robot.enable()
@@ -152,6 +152,19 @@ def test_a_failing_controller_stops_the_robot_like_any_fault(planar_file: Path) 
         with pytest.raises(cdpr.Faulted, match="no way on"):  # it has failed before the command
             robot.move_to([0.0, 1.8])
         assert robot.state == "fault"
+
+
+def test_a_controller_that_commands_its_robot_is_rejected(planar_file: Path) -> None:
+    class Commanding(PoseController):
+        def update(self, state: cdpr.State, target: cdpr.Target) -> np.ndarray:
+            robot.hold()
+            return super().update(state, target)
+
+    with cdpr.simulate(planar_file, controller=Commanding()) as robot:
+        robot.enable()
+        robot.tighten("home")
+        with pytest.raises(cdpr.Faulted, match="a controller or program, uses this handle now"):
+            robot.move_to([0.2, 1.8])
 
 
 def test_wrong_torques_are_named_as_such(planar_file: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import subprocess
@@ -207,6 +208,11 @@ def test_a_rejected_motion_does_not_end_the_previous_one(robot: cdpr.Robot) -> N
         robot.move_to([9.0, 1.8])
     robot.wait_until_done()
     assert robot.position_m == pytest.approx([0.0, 1.9], abs=2e-3)
+
+
+def test_a_handle_cannot_be_copied(robot: cdpr.Robot) -> None:
+    with pytest.raises(TypeError, match="open it in the process that uses it"):
+        copy.deepcopy(robot)
 
 
 def test_wait_runs_exactly_the_requested_time(
