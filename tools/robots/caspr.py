@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cdpr_profiles.bounded_input import read_text
+from cdpr_profiles.bounded_input import read_bytes
 from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.robots.questions import KINDS, SEVEN_CABLES, Default, Question, kind_of
@@ -137,7 +137,7 @@ def _default_set(file: Path) -> list[ElementTree.Element]:
 
 def _root(file: Path, tag: str) -> ElementTree.Element:
     try:
-        root = ElementTree.fromstring(read_text(file, _MOST_BYTES))
+        root = ElementTree.fromstring(read_bytes(file, _MOST_BYTES))
     except ElementTree.ParseError as error:
         raise BadInputError(f"{file}: is not XML: {error}") from None
     if root.tag != tag:

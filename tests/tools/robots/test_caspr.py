@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
+from cdpr_tools.robots.caspr import read_caspr
 from tests.cdpr_here import cdpr_here
 
 BODIES = """<?xml version="1.0" encoding="utf-8"?>
@@ -105,6 +106,13 @@ def test_a_vertical_plane_of_y_and_z_has_the_same_robot_as_one_of_x_and_z(tmp_pa
     status, output, path = imported(tmp_path, bodies, given)
     assert status == 0, output
     assert load_robot(path).platform == platform
+
+
+def test_a_model_may_have_the_encoding_that_it_declares(tmp_path: Path) -> None:
+    text = BODIES.replace("utf-8", "iso-8859-1").replace("Link 1", "Plattform für 2 kg")
+    (tmp_path / "b.xml").write_bytes(text.encode("latin-1"))
+    (tmp_path / "c.xml").write_text(cables())
+    assert read_caspr(tmp_path / "b.xml", tmp_path / "c.xml")
 
 
 def test_targets_are_not_turned_unless_the_angle_is_given(tmp_path: Path) -> None:
