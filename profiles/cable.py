@@ -1,4 +1,4 @@
-"""Cables: a single one with measured values, and a maker's table of sizes."""
+"""Cables: a single one with measured values, and a manufacturer's table of sizes."""
 
 from typing import Annotated, Any, Self
 
@@ -59,7 +59,7 @@ class Cable(Profile):
 
 
 class CableSize(Profile):
-    """One row of a maker's table, as printed."""
+    """One row of a manufacturer's table, as printed."""
 
     code: str
     diameter_mm: Positive
@@ -71,7 +71,7 @@ class CableSize(Profile):
 
 
 class CableSeries(Profile):
-    """A maker's table of sizes; its rows in the file are arrays in the order of `columns`."""
+    """A manufacturer's table of sizes; its rows are arrays in the order of `columns`."""
 
     series: str
     manufacturer: str

@@ -1,4 +1,4 @@
-"""Read makers' EDS and DCF files (CiA 306) into dictionaries of `canopen`."""
+"""Read manufacturers' EDS and DCF files (CiA 306) into dictionaries of `canopen`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motors: a single one with the values a controller needs, and a maker's tables of a series."""
+"""Motors: one with the values a controller needs, and a manufacturer's tables of a series."""
 
 import math
 from typing import Annotated, Any, Self

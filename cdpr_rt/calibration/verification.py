@@ -201,7 +201,7 @@ class Predicted3Sigma:
         return cls(1e3 * float(std[:k].max()), float(turns.max()) if turns.size else None)
 
     def with_shared_scale(self, places_m: FloatArray) -> Self:
-        """Return the accuracy with the scale error of all measured points, at positions (M, k)."""
+        """Return the accuracy at positions (M, k), including the points' common scale error."""
         shared_mm = 3e3 * SHARED_SCALE_STD * float(np.sqrt((places_m**2).mean(axis=0)).max())
         return replace(self, position_mm=math.hypot(self.position_mm, shared_mm))
 

@@ -346,7 +346,7 @@ class _Reader:
         for group in _GROUPS if len(block.codes) > 1 else ():
             both = sorted({code for code in block.codes if code in group})
             if len(both) > 1:
-                raise _LineError(f"{' '.join(both)}: allowed: one of them in a line")
+                raise _LineError(f"{' '.join(both)}: write only one of these codes in a line")
         if self._settings.z_m is not None and "Z" in block.words:
             raise _LineError("Z: --z is only for files without Z")
         for letter in sorted(words.keys() - self._known_letters):

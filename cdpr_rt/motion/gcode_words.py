@@ -303,7 +303,7 @@ def _words(line: str, number: int, findings: Findings, ignored: frozenset[str]) 
             words[letter] = value
     if alone and words.keys() - {"F"} and not any(code[0] == "G" for code in codes):
         findings.refuse(
-            number, f"{alone}: {next(iter(words))} has no meaning with it; put it on its own line"
+            number, f"{alone}: {next(iter(words))} cannot be in its line; put it on a separate line"
         )
         return None
     return Block(number, tuple(codes), words)

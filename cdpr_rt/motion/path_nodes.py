@@ -311,8 +311,8 @@ def nodes_of(path: PathDescription, scale: FloatArray) -> PathNodes:
         i = int(wrong.argmax())
         raise PathError(
             path.source, int(nodes.line[i]),
-            f"the path is {1e3 * off[i]:.4g} mm from the path in the file; allowed: "
-            f"{1e3 * _tolerances(places, pieces)[i]:.4g} mm: divide this move",
+            f"the computed path deviates by {1e3 * off[i]:.4g} mm from the file; allowed: "
+            f"{1e3 * _tolerances(places, pieces)[i]:.4g} mm; divide this move",
         )  # fmt: skip
     nodes = replace(nodes, deviation_m=float(off.max()))
     if pieces.start_waits or pieces.start_dwell_s:
@@ -412,7 +412,7 @@ def _along_pieces(pieces: Pieces, path: PathDescription) -> tuple[FloatArray, ..
         line = int(pieces.line[int((total > MOST_NODES).argmax())])
         raise PathError(
             path.source, line,
-            f"the path is too long from here on: {total[-1]} nodes; allowed: {MOST_NODES}: divide "
+            f"the path is too long from here on: {total[-1]} nodes; allowed: {MOST_NODES}; divide "
             "the file",
         )  # fmt: skip
     i = np.repeat(np.arange(m), given)

@@ -446,7 +446,7 @@ class CableControl(PlaceChecks):
     def use_own(
         self, controller: Controller | None, distribution: TensionDistribution | None
     ) -> None:
-        """Let the user's code choose the tensions off the stand from now on."""
+        """Let the user's code choose the tensions while the platform is off its stand."""
         if distribution is not None:
             self._own_distribution = OwnDistribution(
                 distribution, self.low_N, self.high_N, self.model.wrench_scale, self._period_s

@@ -292,7 +292,7 @@ class LengthSource:
     def lacks_index(self, feedback: AxisFeedback) -> BoolArray:
         """Return which indices (n,) are missing but needed.
 
-        Compensation of cogging needs them, and the lengths of the last stop, which they check.
+        They are needed to compensate cogging and to check the lengths of the last stop.
         """
         compensated = self._parts.compensation
         wanted = np.zeros(self._cable.size, np.bool_)

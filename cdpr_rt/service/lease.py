@@ -154,7 +154,7 @@ class Lease:
         held = self._left_s() > 0.0
         if not token:
             who = f"{self._client} holds it" if held else "nobody holds it"
-            raise LeaseError(f"this needs the right to move; {who}")
+            raise LeaseError(f"this command needs the right to move; {who}")
         if not hmac.compare_digest(token.encode(), self._token.encode()):
             who = f"{self._client} holds it" if held else "it was released or taken over"
             raise LeaseError(f"the right to move is not this client's; {who}")

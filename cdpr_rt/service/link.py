@@ -210,7 +210,9 @@ class LoopLink:
             number = post({"do": do, **fields})
         except SharedBlockError as error:
             if "bytes" in str(error):
-                raise CommandTooLongError(f"a command has {MESSAGE_BYTES} bytes at most") from None
+                raise CommandTooLongError(
+                    f"the command is too long; allowed: {MESSAGE_BYTES} bytes"
+                ) from None
             raise LoopBusyError(str(error)) from None
         future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
         self._pending[number] = future

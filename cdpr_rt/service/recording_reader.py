@@ -215,8 +215,8 @@ class RecordingReader:
         held_bytes = sum(map(len, self._timings[len(rows) :]))
         if len(self._timings) - len(rows) > _MOST_TIMINGS or held_bytes > _MOST_TIMING_BYTES:
             raise RecordingError(
-                f"{self.path}: timings without their rows; allowed: up to {_MOST_TIMINGS}, of "
-                f"{_MOST_TIMING_BYTES} bytes together"
+                f"{self.path}: too many timings without rows; allowed: up to {_MOST_TIMINGS} "
+                f"with up to {_MOST_TIMING_BYTES} bytes in total"
             )
         if not rows:
             return {}

@@ -44,8 +44,8 @@ class Homing:
         drive = group.axes[axis].drive
         if method not in drive.homing_methods:
             raise DriveFaultError(
-                f"drive profile {drive.name!r}: homing method {method} is not among "
-                f"{list(drive.homing_methods)}"
+                f"drive profile {drive.name!r}: homing method {method} is not supported; "
+                f"allowed: {', '.join(map(str, drive.homing_methods))}"
             )
         self.step = HomingStep.READY
         self._group = group

@@ -304,7 +304,7 @@ class SimulatedBusClock(LockstepClock):
         connect(url.channel).close()  # raises if the bus does not exist
         bus = _lead(url)
         if bus is None:
-            raise BusError(f"{url}: the bus has come back with another clock; open it again")
+            raise BusError(f"{url}: the bus was restarted with another clock; open it again")
         bus.set_time(self.now_s)
         self._buses.append(bus)
         return bus

@@ -114,7 +114,7 @@ def _options(text: str, query: str) -> dict[str, Option]:
     try:
         pairs = parse_qsl(query, keep_blank_values=False, strict_parsing=bool(query))
     except ValueError:
-        raise BusError(f"bus {text!r}: options are written ?key=value&key=value") from None
+        raise BusError(f"bus {text!r}: write options as ?key=value&key=value") from None
     return {key: _value(value) for key, value in pairs}
 
 

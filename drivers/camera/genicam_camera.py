@@ -69,7 +69,8 @@ class GenicamCamera(Camera):
         there = [str(one.serial_number) for one in self._harvester.device_info_list]
         if not there:
             raise CameraError(
-                f"camera {self.name}: the producer finds no camera; is it plugged in and powered?"
+                f"camera {self.name}: the GenTL producer finds no camera; is it plugged in and "
+                "powered?"
             )
         if serial and serial not in there:
             raise CameraError(

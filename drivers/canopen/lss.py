@@ -81,7 +81,7 @@ _REASONS = {
 _VENDOR_SPECIFIC = 255
 _NO_ANSWER = {
     _SET_BIT_TIMING: "the device does not answer to a bit rate: it lacks this LSS service, so set "
-    "the bit rate with the maker's tool, and the node id without --bitrate",
+    "the bit rate with the manufacturer's tool, and the node id without --bitrate",
     _STORE: "the device does not answer to the request to store its settings",
 }
 """Problems with a device that has answered before, by the request that it does not answer."""

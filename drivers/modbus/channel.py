@@ -200,7 +200,7 @@ class ModbusTcp:
         what = _named("holding register", start, count)
         answer = self._ask(what, ReadHoldingRegistersRequest(address=start, count=count))
         if len(answer.registers) != count:
-            raise self._wrong(what, f"{len(answer.registers)} registers arrived, not {count}")
+            raise self._wrong(what, f"{len(answer.registers)} registers arrived; expected: {count}")
         return list(answer.registers)
 
     def write_coil(self, address: int, on: bool) -> None:
@@ -371,7 +371,9 @@ class ModbusLine:
         what = f"{kind} register{'s' * (count > 1)} {start}{last}"
         answer = self._ask(unit, what, request)
         if len(answer.registers) != count:
-            raise self._wrong(unit, what, f"{len(answer.registers)} registers arrived, not {count}")
+            raise self._wrong(
+                unit, what, f"{len(answer.registers)} registers arrived; expected: {count}"
+            )
         return list(answer.registers)
 
     def write_register(self, unit: int, address: int, value: int) -> None:

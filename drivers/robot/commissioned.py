@@ -125,7 +125,7 @@ def _load(axis: RobotAxis, bounds: MotorBounds) -> CoggingProfile | None:
 def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingProfile:
     """Return the cogging profile of a motor; raises ConfigurationError, which begins with `whose`.
 
-    The error names file, key and value that the motor cannot have.
+    The error names the file, the key and the value that is impossible for this motor.
     """
     try:
         profile = CoggingProfile.load(path)

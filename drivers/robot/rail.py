@@ -1,4 +1,4 @@
-"""Move a rail: check slack cables and brake, invalidate the calibration, brake at the end."""
+"""Move a rail: require slack cables and a brake, invalidate the calibration, brake at the end."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def open_networks(
 ) -> dict[str, CanNetwork]:
     """Open the buses of `robot` as the only master on this machine; `stack` closes them.
 
-    Raises ConfigurationError, also if another process of this machine runs drives on one of them.
+    Raises ConfigurationError, for example if another process of this machine uses one of them.
     """
     networks: dict[str, CanNetwork] = {}
     for name, url in urls.items():

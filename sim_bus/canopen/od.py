@@ -258,7 +258,7 @@ class ObjectDictionary:
         return od
 
     def _add_identity(self, info: DeviceInformation) -> None:
-        """Complete 1018h from [DeviceInfo]; some makers give the identity only there.
+        """Complete 1018h from [DeviceInfo]; some manufacturers give the identity only there.
 
         An object that the EDS lacks is hidden from the bus.
         """

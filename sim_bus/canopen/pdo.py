@@ -88,7 +88,7 @@ class PdoRecord:
                 entry.hook = self._write_mapping
 
     def _drop_impossible_default(self) -> None:
-        """Map nothing by default if the EDS contradicts its own map, as some makers' files do."""
+        """Map nothing by default if the EDS contradicts its own map, as some files do."""
         count = self._od.entry(self._map)
         try:
             self._resolve_all(int(count.default))

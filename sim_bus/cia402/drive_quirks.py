@@ -1,4 +1,4 @@
-"""Quirks of the simulated drives: deviations of each maker's firmware from CiA 402.
+"""Quirks of the simulated drives: deviations of each manufacturer's firmware from CiA 402.
 
 They are chosen by the drive's identity (1018h), and not by the profiles that a master reads. So an
 error in a profile shows on the bus.
@@ -136,7 +136,7 @@ def quirks_of(od: ObjectDictionary) -> DriveQuirks:
 def add_missing_objects(od: ObjectDictionary, quirks: DriveQuirks) -> None:
     """Add the standard objects that the EDS lacks, for the firmware, hidden from the bus.
 
-    Existing objects of the standard's size get its sign, which some makers' files state wrongly.
+    Existing objects of the standard's size get its sign, which some EDS files state wrongly.
     """
     scaled = set(IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS) if quirks.velocity_in_rpm else set()
     for model in _standard_objects():

@@ -76,7 +76,7 @@ def test_a_platform_is_tightened_moved_and_lowered_to_its_stand(daemon: RealDaem
     for command, named in (
         (("move", "--to", "0", "9000"), "--to 0 9000: y 9000 mm; allowed: 1400 to 2400 mm"),
         (("move", "--to", "0.3", "2.0"), "are these metres? In mm: --to 300 2000"),
-        (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
+        (("move", "--to", "0", "1600", "lower=5"), "cannot be combined with axes"),
         (("jog", "up=5"), "up=5: allowed: x=MM, y=MM for a step of the platform, or AXIS=DEG_S"),
         (("move", "--rotate", "5"), "--rotate 5: this platform has no controlled angle"),
         (("tighten", "--from", "home"), "tighten --from home: the cables are already tight"),

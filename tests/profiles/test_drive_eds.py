@@ -10,7 +10,7 @@ from canopen.objectdictionary import ODVariable
 from cdpr_profiles import DriveProfile, load_drive, load_motor
 
 NAMES = ("generic-cia402", "mnm-profile-torque", "parker-compax3-canopen")
-"""Drives with an EDS of our own; those made from makers' data sheets keep the makers' gaps."""
+"""Drives with an EDS of our own; those made from data sheets keep the gaps of these."""
 NODE_ID = 5
 GENERIC = load_drive("generic-cia402")
 

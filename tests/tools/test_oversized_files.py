@@ -171,7 +171,7 @@ def many_schemas(path: Path) -> None:
     ("name", "write", "bound"),
     [
         ("a.eds", compact_arrays, "objects; allowed: up to 20000"),
-        ("c.nc", full_circles, "nodes; allowed: 1000000: divide the file"),
+        ("c.nc", full_circles, "nodes; allowed: 1000000; divide the file"),
         ("d.nc", empty_lines, "the file has more than"),
         ("e.csv", long_cell, "...; allowed: -1e+06 to 1e+06"),
         ("f.png", many_pixels, "too many pixels; allowed: up to 120000000"),
@@ -181,7 +181,7 @@ def many_schemas(path: Path) -> None:
         ("j.mcap", large_chunk, "a chunk of 1073741824 bytes; allowed: up to 16777216"),
         ("k.mcap", many_events, "too many events; allowed: up to 100000"),
         ("l.mcap", long_event, "bytes; allowed: 262144"),
-        ("m.mcap", timings_alone, "timings without their rows; allowed: up to 100000"),
+        ("m.mcap", timings_alone, "timings without rows; allowed: up to 100000"),
         ("n.mcap", many_schemas, "too many or too long schemas; allowed: up to 64"),
     ],
     ids=lambda value: value.__name__ if callable(value) else None,

@@ -131,7 +131,9 @@ def checked_running(
     _require_other_folder(folder)
     robot, description = robot_of(daemon, as_calibrated=True)
     if robot.path != file.path:
-        raise BadInputError(f"{file.reference}: the daemon of this name runs {robot.reference}")
+        raise BadInputError(
+            f"{file.reference}: the running daemon uses {robot.reference}; end it with `cdpr stop`"
+        )
     known = before(out, file)
     if known is None and camera is not None:
         raise BadInputError("--camera: allowed only if the robot was calibrated with a camera")

@@ -96,9 +96,9 @@ class CalibrationRunSettings(Profile):
             update["points"] = str(points.resolve())
         if poses is not None:
             if (places is None) != (self.places is None):
-                kind = "a list of poses" if self.places is not None else "no list of poses"
+                kind = "a list" if self.places is not None else "a number"
                 raise BadInputError(
-                    f"--poses: the run to be continued began with {kind}; give the same again"
+                    f"--poses: the run to resume began with {kind} of poses; give {kind} again"
                 )
             update |= {"poses": poses, "places": places}
         return self.model_copy(update=update)

@@ -528,7 +528,7 @@ def recordings_are_complete(j: Judge) -> Iterator[str]:
 
 
 def memory_is_bounded(j: Judge) -> Iterator[str]:
-    """A robot runs for weeks."""
+    """Report growth of memory, because a robot runs for weeks."""
     if j.played.rise_MB > _RISE_MB:
         yield f"memory has grown by {j.played.rise_MB:.0f} MB"
 

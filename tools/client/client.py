@@ -191,7 +191,7 @@ def open_daemon(
     timeout = httpx.Timeout(_CONNECT_S, read=answer_s)
     if url is not None:
         if robot is not None or unix is not None:
-            raise BadInputError("--url: not together with --robot or --socket")
+            raise BadInputError("--url: cannot be combined with --robot or --socket")
         headers = {}
         if key_file is not None:
             headers["Authorization"] = f"Bearer {read_key(key_file).decode()}"

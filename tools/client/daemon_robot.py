@@ -309,7 +309,7 @@ class _Remote:
                 self._looked_s = time.monotonic()
                 time.sleep(_PLAN_S)
         if job["number"] != number:
-            raise Refused(f"{file}: another client has planned a path meanwhile")
+            raise Refused(f"{file}: another client has planned a path meanwhile; plan again")
         if job["error"]:
             raise Refused(str(job["error"]))
         if (line := job.get("next_line")) is not None:

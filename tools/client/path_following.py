@@ -89,7 +89,7 @@ def _planned(daemon: Daemon, body: dict[str, Any], number: int) -> dict[str, Any
             job = daemon.get("/path")
             if job["number"] != number:
                 raise WorkFailedError(
-                    f"{body['name']}: another client has planned a path meanwhile"
+                    f"{body['name']}: another client has planned a path meanwhile; plan again"
                 )
             if not job["planning"]:
                 break

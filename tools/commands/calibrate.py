@@ -441,7 +441,8 @@ def _require_as_begun(given: Mapping[str, object]) -> None:
     for name, value in given.items():
         if value:
             raise BadInputError(
-                f"{name}: not together with --resume, which continues with the options of the run"
+                f"{name}: cannot be combined with --resume, which continues with the options of "
+                "the run"
             )
 
 
@@ -491,7 +492,7 @@ def check(
     folder = out_dir or Path("out") / f"check-{profile.profile}"
     if running:
         if scanner or plant is not None:
-            raise BadInputError("--running: not together with --scanner or --plant")
+            raise BadInputError("--running: cannot be combined with --scanner or --plant")
         name = None if socket is not None or url is not None else robot
         with open_daemon(name, socket, url, key_file) as daemon:
             found = checks.checked_running(out, profile, daemon, camera, seed, folder)

@@ -200,7 +200,7 @@ def move(
     if to is not None or rotate is not None:
         if axes or cable:
             given = ", ".join([*(axes or []), *["--cable"] * cable])
-            raise BadInputError(f"--to, --rotate: not together with axes or --cable: {given}")
+            raise BadInputError(f"--to, --rotate: cannot be combined with axes or --cable: {given}")
         move = PlatformMove(to, rotate, relative, frame, speed)
         with in_typed_words("move", move.typed):
             run_to_end(daemon, out, "pose", move.arguments(daemon), arrived=True)

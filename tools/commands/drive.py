@@ -136,7 +136,7 @@ def home(
     drive = winch.profile.drive
     if method not in drive.homing_methods:
         known = ", ".join(map(str, drive.homing_methods))
-        raise BadInputError(f"--method {method}: allowed with {drive.name}: {known}")
+        raise BadInputError(f"--method {method}: {drive.name} allows only: {known}")
     with winch.powered("homing turns the motor by up to a turn") as session:
         session.find_index(method)
         position = math.degrees(session.device.feedback.position_rad[0])

@@ -1,4 +1,4 @@
-"""`cdpr drive import`: a drive profile from the maker's EDS or DCF."""
+"""`cdpr drive import`: a drive profile from the manufacturer's EDS or DCF."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _show(out: Output, eds: DataSheet, made: Proposal, profile: Path, copy: Path
     suggested = {"node_id": eds.od.node_id, "bitrate_bit_s": eds.od.bitrate}
     if values := ", ".join(f"{key} = {one}" for key, one in suggested.items() if one is not None):
         out.say(f"for the winch's file: {values}")
-    out.say(f"{copy}: the maker's file")
+    out.say(f"{copy}: the manufacturer's file")
     out.say(f"{profile}: name it as `drive` in your winch's file")
 
 
@@ -204,7 +204,7 @@ _TOPICS = {
     "firmware": Unknown(
         "revision of your drive",
         "a drive may have newer firmware than the EDS, which the boot rejects (step N)",
-        "`cdpr bus scan --bus URL`; ask the maker whether the EDS is for that firmware",
+        "`cdpr bus scan --bus URL`; ask the manufacturer whether the EDS is for that firmware",
     ),
     "modes": Unknown(
         "modes of operation",
@@ -310,7 +310,7 @@ _MAKERS = {
         )
     },
 }
-"""Keys that hold for all drives of a maker, by vendor id."""
+"""Keys that hold for all drives of a manufacturer, by vendor id."""
 _CONSEQUENCES = {
     0x1006: "the drive does not know the cycle's period",
     0x1008: "the boot cannot show the device's name",
@@ -360,7 +360,7 @@ def propose(eds: DataSheet) -> Proposal:
     for index, why in _CONSEQUENCES.items():
         if index not in eds.od.indices:
             what = f"{index:04X}h is not in the EDS"
-            made.unknown.append(Unknown(what, why, "ask the maker, or get a newer EDS"))
+            made.unknown.append(Unknown(what, why, "ask the manufacturer, or get a newer EDS"))
     return made
 
 
@@ -411,7 +411,7 @@ def _identity(made: Proposal, eds: DataSheet) -> None:
 
 
 def _units(made: Proposal, eds: DataSheet) -> None:
-    """Set the units that the drive states itself (60A9h) or that its maker is known for."""
+    """Set the units that the drive states itself (60A9h) or that its manufacturer is known for."""
     for key, (value, status, how) in _MAKERS.get(made.table["vendor_id"], {}).items():
         made.set(key, value, status, how)
     unit = VELOCITY_UNITS.get(_number(eds, 0x60A9) or 0)

@@ -118,7 +118,7 @@ def lss(
     if url.starts_own_simulator:
         raise BadInputError(f"--bus {bus}: name an existing bus, such as simbus:NAME")
     if activate and bitrate is None:
-        raise BadInputError("--activate: only with --bitrate")
+        raise BadInputError("--activate: allowed only with --bitrate")
     if serial is not None and serial > 0xFFFFFFFF:
         raise BadInputError(f"--serial {serial}: allowed: 0 to {0xFFFFFFFF}")
     rate = None if bitrate is None else _bitrate(bitrate)

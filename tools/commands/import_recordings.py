@@ -100,7 +100,7 @@ def calibration(
     out = Output(as_json)
     path = out_dir / "data.json"
     if path.exists() and not overwrite:
-        raise BadInputError(f"{path}: exists already; replace it with --overwrite")
+        raise BadInputError(f"{path}: already exists; replace it with --overwrite")
     profile = load_robot(robot)
     data, notes = import_calibration(cables, poses or cables, mapping, profile)
     for note in notes:

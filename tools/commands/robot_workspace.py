@@ -46,7 +46,7 @@ class _Typed:
             return np.zeros((1, 3))
         option = f"--rotate {self.rotate}" if self.within is None else f"--within {self.within:g}"
         if self.rotate is not None and self.within is not None:
-            raise BadInputError(f"--rotate {self.rotate}: not together with --within")
+            raise BadInputError(f"--rotate {self.rotate}: cannot be combined with --within")
         axes = [i - 3 for i in directions_of(platform) if i >= 3]
         if not axes:
             raise BadInputError(f"{option}: this platform has no controlled angle; omit the option")

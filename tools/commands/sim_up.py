@@ -106,7 +106,7 @@ def up(
             )  # fmt: skip
         else:
             if scanner is not None or camera is not None:
-                raise BadInputError("--scanner, --camera: for a robot with a platform")
+                raise BadInputError("--scanner, --camera: allowed only for a robot with a platform")
             if detached:
                 raise BadInputError(
                     "--detached: only for a robot; a winch's plant file describes its load"

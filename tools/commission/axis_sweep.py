@@ -69,7 +69,7 @@ class SweptAxis:
             raise BadInputError(f"{robot.name}: its daemon only listens (--read-only)")
         if not status["parts"].get("recording", {}).get("recording"):
             raise BadInputError(
-                f"{robot.name}: its daemon does not record; start it with a recording"
+                f"{robot.name}: its daemon does not record; start `cdpr run` without --no-record"
             )
         if status["state"] != "ready":
             raise BadInputError(f"{robot.name} is {status['state']}; allowed: ready, without power")

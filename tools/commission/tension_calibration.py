@@ -1,4 +1,4 @@
-"""Make the calibration file of a winch, from hung masses or from a cable pulled at a load cell."""
+"""Make the calibration file of a winch, from hung masses or a cable fastened to a load cell."""
 
 from __future__ import annotations
 
@@ -67,8 +67,9 @@ def plan_anchor(
     most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / gain
     if not 0.0 < lowest_N < highest_N <= most:
         raise InvalidRequestError(
-            f"--lowest-n {lowest_N:g}, --highest-n {highest_N:g}; allowed: rising and up to "
-            f"{most:.0f} N, which takes {100 * _TORQUE_SHARE:g} % of the motor's rated torque"
+            f"--lowest-n {lowest_N:g}, --highest-n {highest_N:g}; the first must be "
+            f"above 0 and below the second, and the second at most {most:.0f} N "
+            f"({100 * _TORQUE_SHARE:g} % of the motor's rated torque)"
         )
     return AnchorPlan(lowest_N, highest_N, speed_m_s / gain, most_travel_m / gain)
 

@@ -188,7 +188,7 @@ class _Plans:
     def _lens(self, request: models.CalibrateLens) -> Procedure:
         if not self.settings.simulated:
             raise ProcedureError(
-                "somebody has to move the board before the camera: "
+                "a person must move the board in front of the camera; run: "
                 "cdpr camera calibrate opencv:0 --out lens.toml"
             )
         out = self.folder / "lens"

@@ -100,6 +100,6 @@ class _DescribingProcess:
         answer = await process.stdout.readline()
         if not answer:
             self.end()
-            raise DescribingError("the computation has ended: out of memory?")
+            raise DescribingError("the computation ended unexpectedly: out of memory?")
         found: dict[str, Any] = json.loads(answer)
         return found

@@ -83,7 +83,7 @@ def import_recording(
     elif measured is not None:
         time = measured.time_s
     else:
-        raise ProfileError(mapping_path, "", "no tables; allowed: cables, columns, pose")
+        raise ProfileError(mapping_path, "", "contains no tables; allowed: cables, columns, pose")
     chosen = np.flatnonzero((time >= mapping.from_s) & (time <= mapping.until_s))
     if not chosen.size:
         raise BadInputError(

@@ -206,7 +206,7 @@ def _read_csv(path: Path, rows: Iterator[_Row], digest: str, comment: str) -> Ta
     if not head and first is None:
         raise ProfileError(path, "", "contains no lines; allowed: a line of names, then numbers")
     if first is None:
-        raise ProfileError(path, "", "contains no rows of numbers below the names")
+        raise ProfileError(path, "", "contains no rows of numbers below the line of names")
     width = len(_cells(first[1]))
     named = [cells for cells in head if len(cells) >= width]
     names, units = (named or [[]])[-1], {}
@@ -256,7 +256,7 @@ def _table(
                     faults[name] = fault
             numbers.append(value)
     if not lines:
-        raise ProfileError(path, "", "contains no rows of numbers below the names")
+        raise ProfileError(path, "", "contains no rows of numbers below the line of names")
     cells = np.array(numbers).reshape(len(lines), len(names))
     columns = {name: cells[:, j] for j, name in enumerate(names) if name}
     return Table(path, digest, columns, np.array(lines), units, faults)

@@ -76,7 +76,9 @@ def read_pose_table(path: Path, n: int) -> PoseTable:
     def columns(*wanted: str) -> FloatArray | None:
         missing = [name for name in wanted if name not in names]
         if missing and len(missing) < len(wanted):
-            raise BadInputError(f"{path}: column {missing[0]} is missing; allowed: all of {wanted}")
+            raise BadInputError(
+                f"{path}: column {missing[0]} is missing; required: {', '.join(wanted)}"
+            )
         return None if missing else np.transpose([column(name) for name in wanted])
 
     each = range(1, n + 1)

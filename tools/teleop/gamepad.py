@@ -252,7 +252,7 @@ def stick_map(
         raise BadInputError(f"--axes, --turn-axes {given}: each axis may be used only once")
     held, pressed = _code("--dead-man", dead_man, "BTN_"), _code("--confirm", confirm, "BTN_")
     if held == pressed:
-        raise BadInputError(f"--confirm {confirm}: allowed: another button than --dead-man")
+        raise BadInputError(f"--confirm {confirm}: must differ from the button of --dead-man")
     return StickMap(moves, turns, about, held, pressed, dead_zone, speed_m_s)
 
 

@@ -143,7 +143,7 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
             ROOM,
             r":2: R: the number is too large",
         ),
-        (["G0 X0 Y0 Z0 F60", "G1 X1", "M48 X5 Y5"], ROOM, r":3: M48: X has no meaning with it"),
+        (["G0 X0 Y0 Z0 F60", "G1 X1", "M48 X5 Y5"], ROOM, r":3: M48: X cannot be in its line"),
         (["G0 X0 Y0 Z0 F60", "G90.1 G2 X5 I2"], ROOM, r":2: G2: after G90.1 both I and J"),
         (["G0 X0 Y0 Z0", "M104 S200 G1 X5"], ROOM, r":2: M104 and G1 are on one line"),
         (["G0 X0 Y0 Z0", "M220 S50"], ROOM, r":2: M220: is not supported"),
@@ -296,7 +296,7 @@ def test_inverse_time_gives_the_duration_of_each_move():
     np.testing.assert_allclose([move.speed for move in path.moves], [3e-3, 0.02 * math.pi / 30.0])
 
 
-def test_stops_before_the_first_position_move_to_the_beginning_of_the_path():
+def test_waits_before_the_first_position_are_at_the_beginning_of_the_path():
     path = read("G0 Z50", "M0 (clamp it)", "G4 P2", "G0 X0 Y0", "G1 X50 F3000", "M2")
     nodes = nodes_of(path, np.ones(6))
     assert nodes.runs[0].tolist() == [0, 0]

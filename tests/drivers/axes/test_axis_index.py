@@ -76,7 +76,7 @@ def test_a_second_homing_moves_although_the_drive_is_already_homed(rig: Rig) -> 
 
 
 def test_a_homing_method_missing_in_the_profile_is_rejected(rig: Rig) -> None:
-    with pytest.raises(DriveFaultError, match="homing method 19 is not among"):
+    with pytest.raises(DriveFaultError, match="homing method 19 is not supported"):
         Homing(rig.group, 0, 19)
 
 

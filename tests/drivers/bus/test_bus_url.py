@@ -47,7 +47,7 @@ def test_known_forms_are_parsed(
         ("simbus:a b", "a simbus name has"),
         ("simbus:../x", "a simbus name has"),
         ("simbus:one?bitrate=5", "has no options"),
-        ("slcan:/dev/ttyACM0?bitrate", "options are written"),
+        ("slcan:/dev/ttyACM0?bitrate", "write options as"),
         ("socketcand:can0", "write it as socketcand://"),
         ("socketcand://host:99999/can0", "write it as socketcand://"),
     ],

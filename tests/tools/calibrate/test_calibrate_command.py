@@ -443,6 +443,6 @@ def test_a_resumed_run_rejects_options_of_its_start(given: tuple[str, ...], tmp_
     done = cdpr_here("calibrate", "run", "planar-4", *where, *given)
     assert done.returncode == 2
     assert (
-        f"{given[0]}: not together with --resume, which continues with the options of the run"
+        f"{given[0]}: cannot be combined with --resume, which continues with the options of the run"
         in done.stderr
     )

@@ -184,7 +184,7 @@ def test_an_enabled_drive_gets_no_node_id() -> None:
     ("arguments", "problem"),
     [
         (("--bitrate", "123k"), "--bitrate 123k: allowed: 1000k, 800k, 500k, 250k"),
-        (("--activate",), "--activate: only with --bitrate"),
+        (("--activate",), "--activate: allowed only with --bitrate"),
         (("--serial", str(1 << 32)), "--serial 4294967296: allowed: 0 to 4294967295"),
         (("--profile", "nobodys"), "no profile named 'nobodys'"),
         ((), "no simulated bus of that name"),

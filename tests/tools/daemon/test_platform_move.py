@@ -232,7 +232,7 @@ def test_a_step_takes_each_direction_once(
     ("words", "message"),
     [
         (["--to"], "requires an argument"),
-        (["--to", "1", "2", "left=3"], "not together with axes"),
+        (["--to", "1", "2", "left=3"], "cannot be combined with axes"),
         (["--frame", "platform", "left=3"], "--frame platform: allowed only with"),
         (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],

@@ -123,7 +123,10 @@ def test_a_centre_outside_the_workspace_is_rejected_with_one_inside() -> None:
         (["planar-4", "--within", "180"], "less than 180 deg"),
         (["planar-4", "--within", "-1"], "less than 180 deg"),
         (["spatial-8", "--rotate", "1", "2"], "2 numbers; allowed: 3, RX RY RZ in deg"),
-        (["spatial-8", "--rotate", "1", "2", "3", "--within", "4"], "not together with --within"),
+        (
+            ["spatial-8", "--rotate", "1", "2", "3", "--within", "4"],
+            "cannot be combined with --within",
+        ),
         (["spatial-8", "--centre", "1", "2", "nan"], "allowed: finite numbers"),
         (["planar-3", "--low", "1", "2", "3"], "3 numbers; allowed: 2, X Y in mm"),
         (["planar-3", "--low", "0", "0", "--high", "100", "0"], "--low below --high"),
