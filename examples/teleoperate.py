@@ -1,7 +1,7 @@
 """Lead the platform of planar-3 around a circle, by a stream of positions as from a hand.
 
 You see how far the platform is behind the hand, which moves twice as far. In place of the circle
-read your input device. For a daemon, use cdpr.run("planar-3", bus="simbus:", stream="127.0.0.1:0").
+read your input device. For a daemon, use cdpr.run("planar-3", bus="simbus:").
 """
 
 import numpy as np

@@ -41,7 +41,7 @@ class CommandArguments:
         """Return which of the keys was given; raises ProgramError unless it is exactly one."""
         given = [key for key in keys if key in self._arguments]
         if len(given) != 1:
-            found = " and ".join(given) if given else "none of them"
+            found = " and ".join(given) if given else "no argument"
             raise ProgramError(f"{self._program}: {found}; allowed: one of {', '.join(keys)}")
         return given[0]
 

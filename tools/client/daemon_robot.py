@@ -103,13 +103,14 @@ def run(
     """Start a daemon as `cdpr run` does and return its robot.
 
     `bus` are URLs as for `--bus`, such as "simbus:" for simulated drives; by default those of the
-    robot's file. `record` is the folder of the recording. `stream` is the HOST:PORT at which
-    `Robot.stream` reaches the daemon, such as "127.0.0.1:0". `controller`, `tension_distribution`
-    and `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the robot's file names code,
-    `allow_code` allows it from now on. A bus with real drives needs `yes`. The daemon ends when the
-    handle is closed or the script dies: it lowers the platform and removes the power. Raises
-    AlreadyRunning, InvalidRobot, and InvalidArgument if `yes` is missing. Raises Error if the
-    daemon does not start, or does not confirm at its end that the power is off.
+    robot's file. `record` is the folder of the recording. `stream` is the HOST:PORT at which the
+    daemon receives set-points, by default a free port of this machine. `controller`,
+    `tension_distribution` and `programs` are your own: "FILE.py:NAME" or "MODULE:NAME". If the
+    robot's file names code, `allow_code` allows it from now on. A bus with real drives needs
+    `yes`. The daemon ends when the handle is closed or the script dies: it lowers the platform and
+    removes the power. Raises AlreadyRunning, InvalidRobot, and InvalidArgument if `yes` is
+    missing. Raises Error if the daemon does not start, or does not confirm at its end that the
+    power is off.
     """
     _require_no_daemon(str(robot))
     buses = texts_of("bus", bus or ())

@@ -182,7 +182,7 @@ def hold(daemon: Daemon, out: Output) -> None:
         status = daemon.get("/status")
         more = [*where_text(status), *next_steps(status)]
         if status["program"] == "hold" and not next_steps(status):
-            more.append("next: `cdpr resume` continues an interrupted move or path")
+            more.append("if this interrupted a move or path: `cdpr resume` continues it")
     _show(out, answer, *more)
 
 

@@ -139,7 +139,7 @@ def test_the_mean_of_exit_points_stays_without_measured_poses() -> None:
     assert np.abs(found.geometry.cable[:, :3].mean(axis=0)).max() < 2e-3
 
 
-def test_poses_with_the_true_geometry_are_true() -> None:
+def test_the_true_geometry_gives_the_true_poses() -> None:
     what = made_up("spatial-8", 20, 6)
     there = locate(what.true, what.seen)
     true = np.array([pose.array for pose in what.poses])

@@ -127,8 +127,8 @@ def test_a_full_circle_and_a_helix_have_their_angle_and_length():
         (["G0 X0 Y0 Z0", "$J=G91 X5 F60"], ROOM, r":2: \$J=.*: a command to a controller.*remove"),
         (["G0 X0 Y0 Z0", "G29 X5"], ROOM, r":2: G29: allowed only for printers, without axes"),
         (["G0 X0 Y0 Z0", "START_PRINT T=1"], ROOM, r":2: START_PRINT: a macro.*--ignore START_PRI"),
-        (["G0 X0 Y0 Z0", "G0 G1 X5"], ROOM, r":2: G0 G1: allowed: one"),
-        (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: allowed: one"),
+        (["G0 X0 Y0 Z0", "G0 G1 X5"], ROOM, r":2: G0 G1: write only one"),
+        (["G90 G91", "G0 X0 Y0 Z0"], ROOM, r":1: G90 G91: write only one"),
         (["G0 X0 Y0 Z0", "X1 X2"], ROOM, r":2: X occurs twice"),
         (["G0 X0 Y0 Z0", "X1 Yes"], ROOM, r":2: 'Yes': allowed: words"),
         (["G0 X0 Y0 Z0", "X1e2"], ROOM, r":2: X1e2: a number must have no exponent"),
@@ -362,7 +362,7 @@ def test_a_program_for_five_axes_is_rejected_and_one_rotary_axis_is_noted():
     ]
 
 
-def test_a_rotation_given_in_the_room_is_one_rotation_also_in_a_turned_file():
+def test_a_rotation_about_a_room_axis_keeps_its_axis_in_a_rotated_file():
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     path = read("G0 X0 Y0 Z0", "G53 G0 A5", "M2", placement=turn)
     np.testing.assert_allclose(path.moves[-1].end[3:], [math.radians(5.0), 0, 0], atol=1e-12)

@@ -247,7 +247,7 @@ NAN, INF = float("nan"), float("inf")
     [
         ("idle", {"x": 1}, r"idle: key 'x'; allowed: none"),
         ("hold", {"position_rad": [0.0]}, r"hold: key 'position_rad'; allowed: none"),
-        ("jog", {}, r"jog: none of them; allowed: one of velocity_rad_s, cable_velocity_m_s"),
+        ("jog", {}, r"jog: no argument; allowed: one of velocity_rad_s, cable_velocity_m_s"),
         ("jog", {"velocity_rad_s": [0.0] * N, "cable_velocity_m_s": [0.0] * N}, r"one of"),
         ("jog", {"velocity_rad_s": 1.0}, r"value 1.0; allowed: a list of 3, one number an axis"),
         ("jog", {"velocity_rad_s": "abc"}, r"value 'abc'; allowed: a list of 3"),
