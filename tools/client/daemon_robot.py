@@ -59,8 +59,9 @@ _OBSERVE_S: Final = 0.02
 _OBSERVED: Final = ("position_rad", "cable_length_m", "tension_N")
 _LEAST_ROWS: Final = 2
 _SILENT_S: Final = 5.0
-_LOOKED_AFTER_S: Final = 1.0
+_HANGS_S: Final = 10.0
 """A loop that has run no cycle for this time hangs."""
+_LOOKED_AFTER_S: Final = 1.0
 _END_S: Final = 90.0
 """Time for a daemon to end, in addition to the time to lower the platform."""
 
@@ -245,8 +246,14 @@ class _Remote:
             yield
 
     def brief_status(self) -> dict[str, Any]:
-        """See `Backend.brief_status`."""
-        return self.status()
+        """See `Backend.brief_status`; raises Error if the loop hangs with the drives' power on."""
+        status = self.status()
+        if status["state"] == "active" and _silent_s(status) > _HANGS_S:
+            raise Error(
+                f"the loop has run no cycle for {_HANGS_S:g} s: does a controller or program not "
+                "return? `cdpr estop` removes the power"
+            )
+        return status
 
     def status(self) -> dict[str, Any]:
         self._looked_s = time.monotonic()
