@@ -37,7 +37,7 @@ def write_toml(path: Path, type_: str, order: str, kind: str, status_address: in
     """Write a file of sensors with a different register map."""
     scale = 0.1 if type_.endswith("16") else 0.01
     path.write_text(f"""
-name = "another maker's"
+name = "another manufacturer's"
 baudrate = 19200
 answer_timeout_s = 0.2
 retries = 0

@@ -300,7 +300,7 @@ def test_a_check_requires_a_robot_that_runs_with_its_calibration(
     daemon = Calibrated(calibrated(file), 0.0)
     with pytest.raises(BadInputError, match="calibrated with a camera"):
         checked_running(out, file, daemon, "opencv:0", 1, folder)  # type: ignore[arg-type]
-    with pytest.raises(BadInputError, match="the daemon of this name runs"):
+    with pytest.raises(BadInputError, match="the running daemon uses"):
         checked_running(out, ROBOT, daemon, None, 1, folder)  # type: ignore[arg-type]
     undo(file)
     with pytest.raises(BadInputError, match="or its calibration has changed"):

@@ -42,5 +42,5 @@ def test_a_recording_of_a_different_kind_is_rejected(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tensions_N", [(0.0, 80.0), (80.0, 10.0), (10.0, 1e4)])
 def test_tensions_beyond_the_motors_torque_are_rejected(tensions_N: tuple[float, float]) -> None:
-    with pytest.raises(InvalidRequestError, match="rising and up to"):
+    with pytest.raises(InvalidRequestError, match="must be above 0 and below the second"):
         plan_anchor(load_winch("winch-mpp0923d"), *tensions_N, 5e-3, 0.5)
