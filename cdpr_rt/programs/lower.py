@@ -36,7 +36,7 @@ _LIGHT = 0.2
 _SPARE_HOME_m = 0.01
 """Cable paid out at home in addition to the length that reaches the stand."""
 _DISOBEYS_m = 0.03
-"""Cable that a winch may wind in while all of them set the platform down."""
+"""Cable that a winch may wind in while all of them pay out."""
 _STILL_m = 0.001
 _RUNNING_IN_m_s = 0.02
 _STILL_S = 1.0
@@ -82,9 +82,10 @@ class LowerProgram(PlatformProgram):
     A small tension does not prove that a platform stands: friction of the winches may hold it. So
     each winch pays out the length that its cable needs to reach the stand from the last set-point,
     against friction if necessary. If a push greater than the friction does not turn a winch, the
-    winch ignores commands, or its cable also holds without power. The program ends when the torque
-    has faded out and no cable has then run out for a second. If a winch winds in cable while the
-    platform is set down at home, the program ends immediately.
+    winch ignores commands, or its cable also holds without power. A winch that has wound in cable
+    instead may also hold the platform. The program ends when the torque has faded out and no cable
+    has then run out for a second. If a winch winds in cable while the platform is set down at home,
+    the program ends immediately.
     """
 
     name = "lower"
@@ -252,7 +253,7 @@ class LowerProgram(PlatformProgram):
 
     def _is_dragged(self, feedback: AxisFeedback) -> bool:
         """Return whether a winch winds in cable; end then, while the platform stands."""
-        in_m = self._cable * (self._down_rad - feedback.position_rad)
+        in_m = self._wound_in_m(feedback)
         i = int(in_m.argmax())
         if in_m[i] <= _DISOBEYS_m:
             return False
@@ -262,6 +263,10 @@ class LowerProgram(PlatformProgram):
         )
         self._parts.last_stop.displaced = self._at_rest = True
         return True
+
+    def _wound_in_m(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the cable that each winch has wound in since it was to pay out, (n,)."""
+        return self._cable * (self._down_rad - feedback.position_rad)
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         winches, period_s = self._winches, self._parts.period_s
@@ -284,11 +289,19 @@ class LowerProgram(PlatformProgram):
         elif self._still * period_s > _STILL_S or self._cycles * period_s > self._down_s:
             self._at_rest = not low_N.any()
             if self._stage == "down":
+                unfinished = winches.stuck | (winches.left_m > 0.0)
+                in_m = self._wound_in_m(feedback) * unfinished
+                i = int(in_m.argmax())
                 if self._still * period_s <= _STILL_S:
                     self._trouble = f"the platform did not come to rest within {self._down_s:.0f} s"
                 elif winches.stuck.any() and not self._parts.last_stop.fallen:
                     name = self._parts.names[int(winches.stuck.argmax())]
                     self._trouble = f"{name} was pushed to pay out cable and did not turn"
+                elif in_m[i] > _DISOBEYS_m:
+                    self._trouble = (
+                        f"{self._parts.names[i]} wound in {1e3 * in_m[i]:.0f} mm instead of paying "
+                        "out: its drive does not obey"
+                    )
                 if self._trouble:
                     self._parts.last_stop.fallen = True
                     self._trouble += "; if the platform hangs, it may fall when the power goes off"

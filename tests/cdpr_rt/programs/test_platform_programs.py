@@ -369,6 +369,21 @@ def test_a_winch_that_does_not_turn_is_reported_and_the_platform_counts_as_falle
     assert robot.parts.last_stop.fallen
 
 
+def test_a_winch_that_winds_in_during_lowering_is_reported_before_the_power_goes_off() -> None:
+    robot = tightened(Standing())
+    robot.parts.last_stop.fallen = True  # as after a fault of a hanging platform
+    robot.switch("lower", {"blind": True})
+    pulled_rad, told = robot.angle[2] - 0.1 / robot.cable_m[2], robot.program.progress()
+    for _ in range(20_000):
+        robot.run(PERIOD_S)
+        robot.angle[2], robot.speed[2] = pulled_rad, 0.0
+        if (told := robot.program.progress())["done"]:
+            break
+    assert told["done"]
+    assert "lower wound in 100 mm instead of paying out" in told["trouble"]
+    assert "may fall when the power goes off" in told["trouble"]
+
+
 @pytest.mark.parametrize(
     ("noise_rad", "text"), [(0.0, "its encoder shows no motion"), (0.2, "mostly noise")]
 )
