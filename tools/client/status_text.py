@@ -275,8 +275,12 @@ def next_steps(status: dict[str, Any]) -> list[str]:
         return ["next: remove the cause, then `cdpr check`"]
     progress = status.get("program_progress") or {}
     failed = status["program"] == "tighten" and bool(progress.get("trouble"))
+    rests = status["program"] == "hold" or (
+        status["program"] == "jog"
+        and (progress.get("left_s") == 0.0 or progress.get("done") == 1.0)
+    )
     loose = last and (
-        (status["program"] == "hold" and progress.get("tight") is False)
+        (rests and progress.get("tight") is False)
         or (status["program"] == "lower" and progress.get("done") == 1.0)
         or (failed and progress.get("tight") is False)
     )
