@@ -132,7 +132,7 @@ class Limit(IntEnum):
         21,
         "controlled stop",
         "the cables' lengths suddenly changed relative to each other by {:.1f} mm, {:.1f} mm "
-        "allowed: a cable slipped or met an obstacle",
+        "allowed: a cable slipped, broke or met an obstacle",
         "m",
         1e3,
         "lengths",

@@ -65,6 +65,9 @@ class Played:
     truth: Any = None
     """Records of the pose log since the beginning."""
     rows: Any = None
+    """The last rows, as many as the ring keeps."""
+    cycles: int = 0
+    """Number of rows since the beginning."""
     row_truth: Any = None
     """Number of the record of the truth at each row, or -1."""
     last_truth: dict[str, Any] = field(default_factory=dict)
@@ -376,6 +379,7 @@ class Player:
             self._first_truth :
         ]
         rows = rig.kept_rows(self._first_row)
+        played.cycles = rig.rows_written - self._first_row
         played.rows, played.row_truth = rows, self._row_truth(rows.size)
         digest = hashlib.sha256(played.truth.tobytes())
         for name in FIELDS:
