@@ -108,15 +108,15 @@ class RobotFile(Profile):
             first = first_on_bus.setdefault((axis.bus, axis.node_id), i)
             if first != i:
                 problem = (
-                    f"value {axis.node_id}; allowed: each node id once on a bus, but axes[{first}] "
-                    f"also has it on {axis.bus!r}"
+                    f"value {axis.node_id}; axes[{first}] already has it on bus {axis.bus!r}; give "
+                    "each drive on a bus another node id"
                 )
                 yield f"axes[{i}].node_id", problem
             other = first_of_all.setdefault(axis.node_id, i)
             if self.safety_io is not None and self.axes[other].bus != axis.bus:
                 problem = (
-                    f"value {axis.node_id}; allowed: with a safety_io, which identifies brakes by "
-                    f"node id, each node id once on all buses (axes[{other}] also has it)"
+                    f"value {axis.node_id}; axes[{other}] already has it; the safety_io identifies "
+                    "brakes by node id, so give each drive on all buses another one"
                 )
                 yield f"axes[{i}].node_id", problem
 

@@ -106,7 +106,7 @@ class PlatformState(NamedTuple):
 
 
 class BoardPlatform:
-    """The platform of a board, for devices on it. The robot publishes its state; all may read."""
+    """State of the simulated platform. The robot publishes it; all devices may read it."""
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
         self._words, self._numbers = words, numbers

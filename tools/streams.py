@@ -64,7 +64,7 @@ class _Standard(io.RawIOBase):
         self.waits = True
         """Whether it waits for a reader without limit."""
         self._fd = number
-        """The descriptor in use: a terminal that must not delay the process is opened again."""
+        """The descriptor in use, a second one if a terminal must not delay the process."""
         self._behind = False
 
     def outlive(self) -> None:

@@ -518,7 +518,7 @@ def fit_map(
     sheets: MarkerSheets,
     reference: int | None = None,
 ) -> MapFit:
-    """Return the map that the sightings, in the order in which they were taken, determine.
+    """Return the marker map from sightings in the order in which they were taken.
 
     Without known marker poses, the map is in the frame of the marker `reference`, by default the
     one on which images agree most. With known poses, it is in the frame of the layout, and known

@@ -129,7 +129,7 @@ def analyse(
 def stiffest_pid(
     inertia_kg_m2: float, latency_s: float, bandwidths_Hz: Sequence[float], period_s: float
 ) -> PidDesign:
-    """Return the PID with the highest of some bandwidths that keeps the margins.
+    """Return the PID with the highest of the given bandwidths that keeps the margins.
 
     Raises TuningError, with the possible margins, if no bandwidth does.
     """

@@ -707,7 +707,7 @@ def free_rotation(model: PlatformModel) -> FreeRotation | None:
 
 
 def _along(ways: FloatArray, speed: float, most: float) -> tuple[FloatArray, FloatArray]:
-    """Return positions and accelerations (steps, m, 2) along straight ways (m, 2, 2) from rest.
+    """Return positions and accelerations (steps, m, 2) along straight lines (m, 2, 2) from rest.
 
     Speed is trapezoidal, with the longer direction at its bounds, and averaged over SHAPING_s.
     """

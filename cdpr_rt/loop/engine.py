@@ -107,7 +107,7 @@ class CycleRows:
         self._fill = bound(_fill, copies, rows, self._size, self._poses, then=then)
 
     def follow(self, engine: Any) -> None:
-        """Bind the present arrays over the axes of `engine` as the sources of their fields.
+        """Use the present per-axis arrays of `engine` as the sources of the row.
 
         Raises TypeError if an array has another type, length or layout than its field.
         """

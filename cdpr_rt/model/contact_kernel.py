@@ -1,4 +1,4 @@
-"""Kernels of clearances at poses, and of the first contact on a straight way, without gaps.
+"""Kernels of clearances at poses, and of the first contact on a straight line, without gaps.
 
 The method is that of Tremblay (thesis), eqs. (3.27), (3.36), (3.37), with conservative advancement.
 At a position on the way, each pair of bodies has a distance d, along the unit vector n between its
@@ -670,7 +670,7 @@ def _write_moves(
         moves[2 * row + end, 1], moves[2 * row + end, 2] = speed, bend
 
 
-# Kernel for every cycle: whether a short straight way leads into contact. Let a pair be d0 and d1
+# Kernel for every cycle: whether a short straight line leads into contact. Let a pair be d0 and d1
 # apart at the ends of a part of the way, and let the points of its two bodies together move by at
 # most l. Then the least distance between the ends is at least (d0 + d1 - l) / 2. If that is too
 # little, the way is divided into more parts.

@@ -1,4 +1,4 @@
-"""Clearances of a robot's cables, platform and boxes, and the first contact on a straight way."""
+"""Clearances of a robot's cables, platform and boxes, and the first contact on a straight line."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Interference:
         return in_words(self.things(int(pair[0])), float(clearance[0]))
 
     def contact_ahead(self, start: FloatArray, end: FloatArray) -> int:
-        """Return a pair that comes into contact on a short straight way between positions (d,).
+        """Return a pair that comes into contact on a short straight line between positions (d,).
 
         Returns -1 for none. The method is meant for every cycle: it allocates no arrays, and may
         report contact if bodies only pass each other quickly and closely. A pair in contact at the
@@ -142,7 +142,7 @@ class Interference:
         return in_words(self.things(pair), self.clearance_m)
 
     def first_contact(self, positions: FloatArray, looks: int = MOST_LOOKS) -> Contact | None:
-        """Return the first contact on the straight ways between successive positions (m, d).
+        """Return the first contact on the straight lines between successive positions (m, d).
 
         The ways are straight in the coordinates of `PlatformModel`: position and rotation vector
         from home's orientation. The result is proved for all positions between, not sampled. A pair
@@ -160,7 +160,7 @@ class Interference:
         return None
 
     def _lead(self, start: FloatArray, end: FloatArray) -> None:
-        """Write the straight way from one position (d,) to another."""
+        """Write the straight line from one position (d,) to another."""
         for k, direction in enumerate(self._directions):
             row, column = (START, direction) if direction < 3 else (TURNED, direction - 3)
             self._way[row, column], self._way[row + 1, column] = start[k], end[k] - start[k]

@@ -180,7 +180,7 @@ class PlatformModel:
         )
 
     def contact_on_way(self, positions: FloatArray, looks: int) -> str:
-        """Return the contact on straight ways between successive positions (m, d) as text, or "".
+        """Return the contact on straight lines between successive positions (m, d) as text, or "".
 
         A pair that `looks` checks of a part of the way do not prove clear counts as in contact.
         """

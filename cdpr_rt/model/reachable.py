@@ -1,4 +1,4 @@
-"""Poses that a robot reaches on a straight way: Tremblay (thesis), section 3.4.4, eq. (3.38)."""
+"""Poses that a robot reaches on a straight line: Tremblay (thesis), section 3.4.4, eq. (3.38)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from cdpr_rt.model.null_space import (
 )
 from cdpr_rt.model.platform_model import PlatformModel
 
-# Kernels that prove for how much of a straight way cables hold a platform. At a position on the
+# Kernels that prove for how much of a straight line cables hold a platform. At a position on the
 # way, let tensions t carry a wrench with a margin m to their bounds. Further along by a share s,
 # the wrench matrix is W + E, and t + δ carries the wrench if δ = -W⁺E (t + δ). With the derivative
 # D of W by the share, and a bound of the remainder, |E - s D| of each column at most first s +
@@ -58,7 +58,7 @@ from cdpr_rt.model.platform_model import PlatformModel
 # way.
 
 LEAST_N: Final = 1e-3
-"""A way ends if the margin falls below this."""
+"""A line ends if the margin falls below this."""
 _MOST_LOOKS = 2000
 _SHARE_OF_LENGTH = 0.25
 """Share by which a cable's length may change from one check to the next."""
@@ -260,7 +260,7 @@ def _kept_for(
     return share
 
 
-# Kernel for how far cables can hold a platform on straight ways without contact.
+# Kernel for how far cables can hold a platform on straight lines without contact.
 
 WHOLE, CONTACT, NOT_HELD = range(3)
 """Why a way ends: at its target, at a contact, or where tensions are not feasible."""
@@ -278,7 +278,7 @@ def reach_all(
     shares: FloatArray,
     why: IntArray,
 ) -> None:
-    """Write the share of each straight way on which a platform is held and clear, eq. (3.38).
+    """Write the share of each straight line on which a platform is held and clear, eq. (3.38).
 
     Ways lead from the position `start` (d,) to each of `ends` (m, d). All other arguments are those
     of `first_contact` and `held_until`; `centred` is the geometry for `held_until`.
@@ -324,7 +324,7 @@ class Reached:
 
 
 class Reach:
-    """How far straight ways go from a start, with a proof for all places between.
+    """How far straight lines go from a start, with a proof for all places between.
 
     Along these ways all tensions stay within their bounds for targets, with the control's reserve,
     at full acceleration, and nothing comes into contact. Positions are those of `PlatformModel`.

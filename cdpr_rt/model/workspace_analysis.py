@@ -39,7 +39,7 @@ class Criterion:
     """Rotation vectors from home's orientation."""
     least_N: float = 0.0
     contact_free: bool = False
-    """Whether the straight way from the centre to a position must also be free of contact: cables,
+    """Whether the straight line from the centre to a position must also be free of contact: cables,
     body and obstacles keep the clearance of the robot's file in each orientation."""
 
     def depths(self, points: FloatArray) -> FloatArray:
@@ -57,7 +57,7 @@ class Criterion:
         return np.asarray(np.min(found, axis=0) - self.least_N)
 
     def clear_shares(self, centre_m: FloatArray, ends_m: FloatArray) -> FloatArray:
-        """Return the contact-free shares (m,) of straight ways from a centre to positions.
+        """Return the contact-free shares (m,) of straight lines from a centre to positions.
 
         Orientation is constant on a way; the share is that of the worst orientation. It is 0 if
         bodies are in contact at the centre. Whole ways are checked because crossing cables are in

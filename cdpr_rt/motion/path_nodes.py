@@ -28,8 +28,7 @@ _CURVATURE_1_m: Final = 1e-6
 EXACT_m: Final = 5e-6
 """Largest distance from the programmed path in exact mode if only the curvature steps."""
 _BULGE: Final = 0.0108
-"""Largest distance between a step in curvature and the curve that replaces it, divided by the step
-and by the square of the length replaced on each side."""
+"""Deviation = this * step in curvature * square of the length that is replaced on each side."""
 _PROJECTIONS: Final = 3
 
 

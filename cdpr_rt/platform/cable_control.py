@@ -104,7 +104,7 @@ class PlaceChecks:
         return self.workspace.infeasibility(self._to)
 
     def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
-        """Return as text why the straight way to a position (d,) is infeasible, or "".
+        """Return as text why the straight line to a position (d,) is infeasible, or "".
 
         The way begins at `start` (d,), or at the set-point.
         """

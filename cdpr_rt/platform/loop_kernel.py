@@ -51,7 +51,7 @@ def shape(past: FloatArray, place: int, wanted: FloatArray, shaped: FloatArray) 
 
     `past` (k, 3, d) are the last k positions, velocities and accelerations, `wanted` (3, d) the
     present ones, `shaped` (3, d) their mean; `place` is the index of the oldest. Oscillations with
-    a period of k cycles are not excited. Bounds, straight ways and the final position do not
+    a period of k cycles are not excited. Bounds, straight lines and the final position do not
     change. Returns the index of the next oldest.
     """
     k, _, d = past.shape

@@ -230,7 +230,7 @@ class LoopGains:
     """Largest rate of the integral part, as a share of 2 ζ ω of the slowest mode."""
     integral_1_s: float
     rotor_kg: float
-    """Mass of a rotor, converted to its cable."""
+    """Equivalent mass of a rotor on its cable."""
     follows_pose: bool = False
     """Whether tensions are planned for the platform's pose, not for the set-point."""
 

@@ -296,7 +296,7 @@ class LowerProgram(PlatformProgram):
                     self._trouble = f"the platform did not come to rest within {self._down_s:.0f} s"
                 elif winches.stuck.any() and not self._parts.last_stop.fallen:
                     name = self._parts.names[int(winches.stuck.argmax())]
-                    self._trouble = f"{name} was pushed to pay out cable and did not turn"
+                    self._trouble = f"{name} was driven to pay out cable but did not turn"
                 elif in_m[i] > _DISOBEYS_m:
                     self._trouble = (
                         f"{self._parts.names[i]} wound in {1e3 * in_m[i]:.0f} mm instead of paying "

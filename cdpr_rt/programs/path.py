@@ -40,11 +40,11 @@ class _Command:
     """Time in the plan to step back to."""
     feed: float
     on_way: bool = False
-    """Whether the straight way to the place where the path begins has been checked."""
+    """Whether the straight line to the place where the path begins has been checked."""
 
 
 class PathProgram(PlatformProgram):
-    """Plays a plan from its beginning or from where it was left, after a straight way to there.
+    """Plays a plan from its beginning or from where it was left, after a straight line to there.
 
     A plan is read and checked against the robot's limits before the command is accepted. The feed
     scales the time along the plan, so the set-point stays on the path whatever the feed.
@@ -178,7 +178,7 @@ class PathProgram(PlatformProgram):
         return plan, min(max(time_s, 0.0), plan.duration_s)
 
     def _require_way(self, plan: StoredPlan, time_s: float) -> None:
-        """Raise ProgramError if the straight way to the position at a time is not feasible."""
+        """Raise ProgramError if the straight line to the position at a time is not feasible."""
         control, begin = self._control, np.array(plan.samples[plan.row(time_s), 0])
         acceleration, stop = np.zeros((2, begin.size))
         along_velocity(control.velocity, self._parts.acceleration, acceleration)
@@ -233,7 +233,7 @@ class PathProgram(PlatformProgram):
         return at_rest and not self._stage
 
     def _set_out(self) -> None:
-        """Begin the straight way to the position at which the path begins or resumes."""
+        """Begin the straight line to the position at which the path begins or resumes."""
         control = self._control
         self._play(0.0)
         self._target[:] = self._setpoint[0]

@@ -298,7 +298,7 @@ class PoseProgram(PlatformProgram):
         )
 
     def _require_way(self, position: FloatArray, asked: Mapping[str, Any]) -> None:
-        """Raise ProgramError if the straight way to a position (d,) is not feasible."""
+        """Raise ProgramError if the straight line to a position (d,) is not feasible."""
         why_not = self._control.way_infeasibility(position)
         if why_not:
             raise ProgramError(self._not_feasible(asked, f"on the way, {why_not}"))
@@ -360,7 +360,7 @@ class PoseProgram(PlatformProgram):
         return at_rest
 
     def _set_out_again(self) -> None:
-        """Try a straight way to the target after an infeasible way, or give up the target."""
+        """Try a straight line to the target after an infeasible way, or give up the target."""
         here, commanded, scale_m = self._control.position, self._commanded, self._parts.scale_m
         if self._blocked or commanded is None:
             return

@@ -123,7 +123,7 @@ def why_not_to_pull(
     """Return the reason why cables must not be tightened at the platform's present pose, or "".
 
     The pose is computed from the lengths `length_m` (n,) at `tension_N` (n,), which have to agree.
-    The platform must not be turned much, and the straight way home must be free of contact.
+    The platform must not be turned much, and the straight line home must be free of contact.
     """
     control, k = parts.control, parts.model.positions
     control.take_lengths(length_m, feedback)

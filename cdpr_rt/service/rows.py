@@ -45,9 +45,7 @@ def plain(value: Any) -> Any:
 
 
 def row_table(row: Row, fields: Iterable[str] = FIELDS) -> dict[str, Any]:
-    """Return the fields of one row; arrays become lists, and numbers of states become their
-    names.
-    """
+    """Return the fields of one row, with arrays as lists and states as names."""
     table = {name: plain(row[name].tolist()) for name in fields}
     for name in LABELS.keys() & table.keys():
         table[name] = LABELS[name].get(table[name], "unknown")

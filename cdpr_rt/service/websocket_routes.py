@@ -363,7 +363,7 @@ class WebSocketRoutes:
 
 
 class _AllCycles:
-    """All cycles not yet sent to one client, with numbers of states instead of their names."""
+    """All cycles not yet sent to one client, with states as numbers instead of names."""
 
     def __init__(self, block: SharedBlock, fields: tuple[str, ...]) -> None:
         self._reader = RowReader(block)

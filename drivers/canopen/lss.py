@@ -51,7 +51,7 @@ __all__ = [
 UNCONFIGURED = 255
 """Node id of a device without one."""
 NODE_ID_UNKNOWN = 0
-"""Node id of a device that does not report it; early devices do not."""
+"""Stands for the node id of a device that cannot report it, such as an early LSS device."""
 
 BITRATE_INDEX = {
     1_000_000: 0,

@@ -60,7 +60,7 @@ def test_winches_inherit_node_id_bit_rate_and_period_from_the_robot(tmp_path: Pa
 @pytest.mark.parametrize(
     ("changes", "key", "problem"),
     [
-        ({"bus": "left"}, "buses[1].name", "axes[1].node_id: value 2; allowed: each node id once"),
+        ({"bus": "left"}, "buses[1].name", "axes[1].node_id: value 2; axes[0] already has it"),
         ({"bus": "rigth"}, "buses[1].name", "allowed: a bus with at least one axis"),
         ({"bus": "rigth"}, "buses[1].name", "axes[0].bus: value 'rigth'; allowed: left, right"),
         ({"top": "master_node_id = 2"}, "axes[0].node_id", "any but master_node_id"),
@@ -118,6 +118,6 @@ def test_paths_of_devices_are_relative_to_the_robots_file(tmp_path: Path):
 
 def test_a_safety_io_requires_unique_node_ids_on_all_buses(tmp_path: Path):
     path = robot_file(tmp_path, top='safety_io = "modbus-remote-io"')
-    with pytest.raises(ProfileError, match="which identifies brakes by node id") as caught:
+    with pytest.raises(ProfileError, match="the safety_io identifies brakes by node id") as caught:
         load_robot(path)
     assert caught.value.key == "axes[1].node_id"

@@ -98,7 +98,7 @@ class DoNothing(PoseController):
 
 
 def measure(starts: int, cycles: int, seconds: float, out: Output) -> Figures:
-    """Measure `starts` first moves in each way, `cycles` cycles in lockstep, and `seconds` paced.
+    """Measure `starts` first moves per method, `cycles` cycles in lockstep, and `seconds` paced.
 
     Raises WorkFailedError if a script fails.
     """

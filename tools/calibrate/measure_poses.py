@@ -413,7 +413,7 @@ def measure_poses(
     kept: StoredPoses,
     out: Output,
 ) -> None:
-    """Move to positions (d,) and read each; go through `between` if the straight way is rejected.
+    """Move to positions (d,) and read each; go through `between` if the straight line is rejected.
 
     If a position is not reached, the reading is taken where the platform stands, also on the way
     through `between`. Raises TripError if the motion is ended, or if the platform does not reach

@@ -128,9 +128,7 @@ def _listed(robot: Robot, path: Path) -> FloatArray:
         if why != WHOLE:
             what = "touches something" if why == CONTACT else "cannot be held"
             middle = ", ".join(f"{x:.3f}" for x in reach.start[: reach.model.positions])
-            text = (
-                f"the straight way from the middle, {middle} m, {what} after {share:.0%} of the way"
-            )
+            text = f"the straight line from the middle, {middle} m, {what} after {share:.0%} of it"
             raise PathError(path, line, text)
     return places
 

@@ -419,7 +419,7 @@ _COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
     "tighten": [_TIGHTEN],
     "tighten --from home": [_TIGHTEN | {"wanted": {"from": "home"}}],
 }
-"""What each step of a status sends to the loop."""
+"""Commands to the loop for each next step that the status names."""
 _STATUS_KEYS: Final = (
     "state", "reason", "reason_limit", "faults", "program", "driving", "reacting", "busy",
     "last_stop", "notices", "failure", "count",

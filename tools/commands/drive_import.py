@@ -305,8 +305,8 @@ _MAKERS = {
             "mA_rms",
             _ASSUMED,
             "Trinamic: mA, assumed to be rms; if they are peak values, the motor's torque is 0.71 "
-            "of each command, and `cdpr tension calibrate` shows a gain of +41 % from the "
-            "geometry: then write mA_peak",
+            "of each command, and `cdpr tension calibrate` shows a gain 41 % above the "
+            "geometric one: then write mA_peak",
         )
     },
 }

@@ -1,4 +1,4 @@
-"""`cdpr poses`: draw poses that a robot can reach on a straight way without contact."""
+"""`cdpr poses`: draw poses that a robot can reach on a straight line without contact."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def poses(
     start: Annotated[
         str | None,
         option(
-            "Start of the straight ways to the poses, in mm; default: home.",
+            "Start of the straight lines to the poses, in mm; default: home.",
             "--from",
             metavar="X Y [Z]",
         ),

@@ -101,8 +101,8 @@ def run(
     keep_gb: Annotated[
         float | None,
         option(
-            "Remove the robot's oldest recordings above this total size, in GB; default in the "
-            "user's folder: 20.",
+            "If the robot's recordings exceed this total size in GB, remove the oldest; default in "
+            "the user's folder: 20.",
             "--keep-gb",
             min=0.01,
         ),

@@ -111,7 +111,7 @@ def _find(robot: str | None, suffix: str) -> list[Path]:
 
 
 def default_recordings() -> Path:
-    """Return the folder of recordings: $XDG_STATE_HOME/cdpr-rt/recordings, or in the home."""
+    """Return the folder of recordings: `recordings` in the state folder."""
     return state_folder() / "recordings"
 
 

@@ -41,7 +41,7 @@ class Reasons:
         )
 
     def after(self, at_ns: int, next_ns: float = float("inf")) -> str:
-        """Return the reason of a reaction at `at_ns`, or ""; the next reaction is at `next_ns`.
+        """Return the reason for a reaction at `at_ns`, or ""; the next reaction is at `next_ns`.
 
         A state that follows a reaction has the same reason.
         """

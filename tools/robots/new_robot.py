@@ -302,7 +302,7 @@ _ANSWERED_BY = {
     "angular_speed_rad_s": "angular_speed_deg_s",
     "angular_acceleration_rad_s2": "angular_acceleration_deg_s2",
 }
-"""Key of the question by the key in a robot's file, if they differ and have no number."""
+"""Maps keys without a number in a robot's file to their questions, if the names differ."""
 
 
 def questioned(found: Sequence[Finding], answers: Answers, typed: Container[str]) -> set[str]:

@@ -47,8 +47,9 @@ class StickMap:
     moves: tuple[SignedAxis, ...]
     """Axes that move the hand along x, y, z; z may be missing."""
     turns: tuple[SignedAxis, ...]
-    """Axes that turn the hand about the room's axes in `about`."""
+    """Axes that turn the hand, each about one axis of the room."""
     about: tuple[int, ...]
+    """Room axis of each entry of `turns`: 0, 1, 2 for x, y, z."""
     dead_man: int
     confirm: int
     dead_zone: float

@@ -1,4 +1,4 @@
-"""The trial of a hand that leads the platform through a bad network: no velocity steps."""
+"""Trial of teleoperation over a bad network: the velocity must not step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far straight ways reach, compared with brute force and other margins; rejected starts."""
+"""How far straight lines reach, compared with brute force and other margins; rejected starts."""
 
 from __future__ import annotations
 

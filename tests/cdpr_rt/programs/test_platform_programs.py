@@ -364,7 +364,7 @@ def test_a_winch_that_does_not_turn_is_reported_and_the_platform_counts_as_falle
         if (told := robot.program.progress())["done"]:
             break
     assert told["done"]
-    assert "lower was pushed to pay out cable and did not turn" in told["trouble"]
+    assert "lower was driven to pay out cable but did not turn" in told["trouble"]
     assert "may fall when the power goes off" in told["trouble"]
     assert robot.parts.last_stop.fallen
 

@@ -1,4 +1,4 @@
-"""Programs of platforms that turn: straight ways in all directions, rejections, hands, lowering."""
+"""Programs of platforms that turn: lines in all directions, rejections, hands, lowering."""
 
 from __future__ import annotations
 

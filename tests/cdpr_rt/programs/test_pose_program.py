@@ -1,4 +1,4 @@
-"""A platform's set-point: straight ways, motion by a hand, and limits."""
+"""A platform's set-point: straight lines, motion by a hand, and limits."""
 
 from __future__ import annotations
 

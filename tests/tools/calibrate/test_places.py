@@ -36,7 +36,7 @@ def test_a_list_gives_all_its_poses_and_home(tmp_path: Path, name: str) -> None:
     assert sorted(map(tuple, batches.tolist())) == sorted(found)
 
 
-def test_a_number_gives_the_number_of_poses() -> None:
+def test_the_option_poses_takes_a_number_from_15_to_1000() -> None:
     assert poses_wanted(ROBOT, None) == (None, None)
     assert poses_wanted(ROBOT, "15") == (15, None)
     for text in ("14", "1001", "-20", "1.5", "", "9" * 5000):
@@ -98,6 +98,6 @@ def test_a_pose_with_contact_on_the_way_is_rejected(
     shares, why = np.ones(20), np.zeros(20, int)
     shares[3], why[3] = 0.4, CONTACT
     monkeypatch.setattr(Reach, "shares", lambda *_: (shares, why))
-    said = r"poses\.csv:5: the straight way from the middle, .* m, touches something after 40%"
+    said = r"poses\.csv:5: the straight line from the middle, .* m, touches something after 40%"
     with pytest.raises(InvalidRequestError, match=said):
         poses_wanted(ROBOT, str(tmp_path / "poses.csv"))
