@@ -98,10 +98,14 @@ class Judge:
 
     @property
     def disturbed_s(self) -> float:
-        """Bus time of the first fault or stall, infinite without one."""
+        """Bus time of the first fault, stall or loss of power, infinite without one.
+
+        A cable that relaxes accelerates the rotor of a motor without torque.
+        """
         begun_s = self.played.began_s
         times = [begun_s + fault["at_s"] for fault in self.played.scenario.faults]
-        times += [at_s for name, at_s in self.played.done if name in ("stall", "die")]
+        ends = ("stall", "die", "power off")
+        times += [at_s for name, at_s in self.played.done if name in ends]
         return min(times, default=math.inf)
 
     def named(self) -> Iterator[tuple[dict[str, Any], float, bool]]:
@@ -252,6 +256,8 @@ class Cause:
             return False
         if axis in (self.axis, -1) or self.axis in named["suspects"] or self.name in _ANYWHERE:
             return True
+        if self.name == "encoder-frozen" and limit == "following_error":
+            return True  # its winch winds in without end, and drags the others from their places
         return limit in _PULLED and self.name not in _ON_THE_BUS
 
 

@@ -151,6 +151,27 @@ def test_each_invariant_finds_its_violation(invariant: str, day: tuple[Played, R
     assert invariant in {violation.partition(":")[0] for violation in violations}
 
 
+def test_speeds_are_limited_until_the_power_is_cut(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    fast = _changed(played, "motor_rad_s", (3, 1), 1e4)
+    for at, kept in ((2, True), (4, False)):
+        cut = replace(fast, done=[("power off", float(fast.truth["time_s"][at]))])
+        found = {one.partition(":")[0] for one in judge(cut, robot).violations}
+        assert ("limits_are_kept" not in found) is kept
+
+
+def test_a_frozen_encoder_may_drag_another_winch_from_its_place(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    for fault, explained in (("encoder-frozen", True), ("encoder-noise", False)):
+        injected = ({**played.scenario.faults[0], "fault": fault},)
+        scenario = replace(played.scenario, faults=injected)
+        named = _with_cause(
+            replace(played, scenario=scenario), axis=0, limit="following_error", code=""
+        )
+        found = {one.partition(":")[0] for one in judge(named, robot).violations}
+        assert ("causes_are_true" not in found) is explained
+
+
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_campaign_that_is_ended_leaves_no_processes_and_files(how: int, tmp_path: Path) -> None:
     command = module_command("cdpr_tools.cli", "sim", "campaign", ROBOT, "--seeds", "2")
