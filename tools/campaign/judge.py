@@ -289,6 +289,8 @@ _PULLED: Final = ("tension_high", "lengths", "lengths_jump", "slack", "broken_ca
 _FROM_OUTSIDE: Final = ("push-x", "push-y", "push-z", "obstacle", "payload")
 _ANYWHERE: Final = (*_FROM_OUTSIDE, "bus-lost")
 """Faults that concern all axes."""
+_DISOBEYS: Final = ("torque-bias", "torque-stuck")
+"""Motors that drag a platform with their own power, to the cable's exit, where it is stiffest."""
 _SURE: Final = (
     "drive-off", "drive-reboot", "drive-fault", "power-lost", "pre-operational", "nmt-stop",
     "bus-off", "bus-lost", "emcy-flood",
@@ -415,7 +417,7 @@ _UNHEARD: Final = ("8130h", "silent", "no_heartbeat", "bus_lost")
 
 def descents_are_predicted(j: Judge) -> Iterator[str]:
     """Whoever stands below or beside must know how a platform may come down."""
-    if len(j.causes) != 1 or j.ended or j.causes[0].name in _ANYWHERE:
+    if len(j.causes) != 1 or j.ended or j.causes[0].name in (*_ANYWHERE, *_DISOBEYS):
         return
     cause, fastest_m_s = j.causes[0], -float(j.truth["velocity_m_s"][:, j.up].min())
     allowed_m_s = predicted(j.played.scenario.robot).fastest_m_s[cause.axis]
@@ -434,6 +436,9 @@ def what_matters_is_noticed(j: Judge) -> Iterator[str]:
     figures = {"tension_N": j.limits.tension_max_N, "motor_rad_s": j.limits.speed_rad_s}
     for name, limit in figures.items():
         over = (np.abs(j.truth[name]) > _OVER * np.broadcast_to(limit, (j.n,))) & calm[:, None]
+        for cause in j.causes:
+            if (name, cause.name) == ("motor_rad_s", "encoder-frozen"):
+                over[:, cause.axis] &= j.truth["time_s"] < cause.at_s  # nothing measures it
         for axis in range(j.n):
             if _longest(over[:, axis]) * j.robot.sync_period_s > _NOTICED_S:
                 most = np.abs(j.truth[name][over[:, axis], axis]).max()
@@ -482,6 +487,7 @@ def limits_are_kept(j: Judge) -> Iterator[str]:
 def tensions_are_predicted(j: Judge) -> Iterator[str]:
     """Cables, frame and platform must withstand what faults do."""
     peaks = j.truth["tension_N"].max(axis=0) if j.truth.size else np.zeros(j.n)
+    peaks[[cause.axis for cause in j.causes if cause.name in _DISOBEYS]] = 0.0
     for axis in np.flatnonzero(peaks > predicted(j.played.scenario.robot).peak_N):
         most = predicted(j.played.scenario.robot).peak_N[axis]
         yield f"axis {axis + 1}: tension {peaks[axis]:.0f} N, at most {most:.0f} N predicted"

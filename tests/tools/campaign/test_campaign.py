@@ -160,6 +160,27 @@ def test_speeds_are_limited_until_the_power_is_cut(day: tuple[Played, Robot]) ->
         assert ("limits_are_kept" not in found) is kept
 
 
+def test_the_tension_of_a_motor_that_disobeys_is_not_predicted(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    injected = ({**played.scenario.faults[0], "fault": "torque-bias", "value": -0.9},)
+    for axis, judged in ((1, False), (0, True)):
+        pulled = _changed(played, "tension_N", (-1, axis), 2000.0)
+        disobeyed = replace(pulled, scenario=replace(played.scenario, faults=injected))
+        found = {one.partition(":")[0] for one in judge(disobeyed, robot).violations}
+        assert ("tensions_are_predicted" in found) is judged
+
+
+def test_only_a_frozen_encoder_hides_the_speed_of_its_winch(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    calm = replace(played, statuses=[s | {"faults": []} for s in played.statuses])
+    for axis, noticed in ((1, True), (0, False)):
+        injected = ({**played.scenario.faults[0], "fault": "encoder-frozen", "at_s": 0.0},)
+        fast = _changed(calm, "motor_rad_s", (slice(None), axis), 1e4)
+        frozen = replace(fast, scenario=replace(played.scenario, faults=injected))
+        found = {one.partition(":")[0] for one in judge(frozen, robot).violations}
+        assert ("what_matters_is_noticed" not in found) is noticed
+
+
 def test_a_frozen_encoder_may_drag_another_winch_from_its_place(day: tuple[Played, Robot]) -> None:
     played, robot = day
     for fault, explained in (("encoder-frozen", True), ("encoder-noise", False)):
