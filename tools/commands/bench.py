@@ -26,7 +26,8 @@ def _run(bench: str, as_json: bool, **given: Any) -> None:
     """Run the benchmark of a module and show its figures."""
     module = importlib.import_module(f"cdpr_tools.bench.{bench}")
     out = Output(as_json)
-    figures = module.measure(**given, out=out)
+    with raised_as(WorkFailedError, RobotError):
+        figures = module.measure(**given, out=out)
     out.say(*figures.lines())
     if figures.error:
         typer.echo(printable(f"cdpr: {figures.error}"), err=True)
@@ -50,8 +51,7 @@ def api(
     The same script runs on a simulation in lockstep and on a daemon in real time. A do-nothing
     controller and one in NumPy take turns with the built-in one.
     """
-    with raised_as(WorkFailedError, RobotError):
-        _run("api", as_json, starts=starts, cycles=cycles, seconds=seconds)
+    _run("api", as_json, starts=starts, cycles=cycles, seconds=seconds)
 
 
 @app.command()
