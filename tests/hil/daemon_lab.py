@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon
+from waiting import until
 
 KEY = "the key of a robot in a test"
 RIGHT = {"Authorization": f"Bearer {KEY}"}

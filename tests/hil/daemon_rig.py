@@ -10,13 +10,13 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import httpx
+from waiting import until
 
 from cdpr_tools.composition.simulator import OwnSimulator
 
@@ -51,15 +51,6 @@ def write_robot(folder: Path, period_s: float = PERIOD_S, limits: str = "") -> P
     path = folder / f"{NAME}.toml"
     path.write_text(_ROBOT.format(period_s=period_s).replace("[limits]", f"[limits]\n{limits}"))
     return path
-
-
-def until(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """Call `what` until its result is true. Return the result."""
-    end = time.monotonic() + patience_s
-    while not (answer := what()):
-        assert time.monotonic() < end, f"not within {patience_s:g} s"
-        time.sleep(0.05)
-    return answer
 
 
 def alive(pid: int) -> bool:

@@ -15,7 +15,8 @@ from threading import Timer
 
 import numpy as np
 import pytest
-from daemon_rig import PATIENCE_S, RealDaemon, alive, until, write_robot
+from daemon_rig import PATIENCE_S, RealDaemon, alive, write_robot
+from waiting import until
 
 import cdpr_rt as cdpr
 from cdpr_rt.arrays import FloatArray

@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 from daemon_lab import KEY, angles, running, setpoints, with_key, with_power
-from daemon_rig import NAME, RealDaemon, until
+from daemon_rig import NAME, RealDaemon
+from waiting import until
 
 from cdpr_tools.cli import main
 

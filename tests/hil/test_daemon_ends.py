@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 from daemon_lab import KEY, with_key
-from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr, until
+from daemon_rig import PATIENCE_S, RealDaemon, alive, cdpr
+from waiting import until
 
 from cdpr_tools.bench.flood import Target
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from daemon_lab import running
-from daemon_rig import NAME, PATIENCE_S, RealDaemon, alive, cdpr, until
+from daemon_rig import NAME, PATIENCE_S, RealDaemon, alive, cdpr
 from test_daemon_kills import (
     NODES,
     PATIENT,
@@ -25,6 +25,7 @@ from test_daemon_kills import (
     slow_daemon,
     third_party,
 )
+from waiting import until
 
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.cia402 import POWER_OFF, State, state_of

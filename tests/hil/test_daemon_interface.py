@@ -14,10 +14,11 @@ import pytest
 import requests
 import schemathesis
 from daemon_lab import RIGHT, angles, events, happened, holding, running, with_key, with_power
-from daemon_rig import PATIENCE_S, RealDaemon, until
+from daemon_rig import PATIENCE_S, RealDaemon
 from hypothesis import HealthCheck, given, settings
 from hypothesis.errors import Unsatisfiable
 from requests.adapters import HTTPAdapter
+from waiting import until
 
 MORE_MEMORY_B = 40e6
 

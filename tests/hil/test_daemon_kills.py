@@ -14,7 +14,8 @@ from typing import Any
 
 import httpx
 import pytest
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon
+from waiting import until
 
 from cdpr_drivers.bus import BusUrl, open_port
 from cdpr_drivers.bus.frames import FRAME

@@ -18,8 +18,9 @@ from pathlib import Path
 import httpx
 import pytest
 from daemon_lab import KEY, with_key
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
 from test_daemon_stream import port_of
+from waiting import until
 
 from cdpr_rt.loop.stop_socket import send_stop
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_rig import RealDaemon, cdpr, held_right, until
+from daemon_rig import RealDaemon, cdpr, held_right
 from test_daemon_kills import third_party
 from test_daemon_teleop import start_up
+from waiting import until
 
 from cdpr_drivers.bus import BusUrl
 from tests.slower_robot import slower_robot

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
+from waiting import until
 
 from cdpr_profiles import load_robot
 from cdpr_rt.calibration.parameters import CableGeometry

@@ -12,8 +12,9 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
-from daemon_rig import RealDaemon, alive, cdpr, until
+from daemon_rig import RealDaemon, alive, cdpr
 from mcap.reader import make_reader
+from waiting import until
 
 from cdpr_tools.daemon.loop_file import LoopFile
 

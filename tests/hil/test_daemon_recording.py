@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
 from mcap.reader import make_reader
+from waiting import until
 from websockets.sync.client import connect
 
 PERIOD_s = 0.01

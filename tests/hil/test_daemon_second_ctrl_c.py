@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
 from test_daemon_kills import Ear
+from waiting import until
 
 from cdpr_drivers.cia402 import POWER_OFF, state_of
 from cdpr_tools.composition.simulator import OwnSimulator

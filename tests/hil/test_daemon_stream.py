@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
+from waiting import until
 
 import cdpr_rt as api
 from cdpr_profiles import load_winch

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_rig import RealDaemon, cdpr, until
+from daemon_rig import RealDaemon, cdpr
+from waiting import until
 
 SWEEP = ("cogging", "sweep-axis")
 

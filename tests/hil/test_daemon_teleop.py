@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, held_right, until
+from daemon_rig import RealDaemon, held_right
 from hostile_proxy import hostile
 from typer.testing import CliRunner
+from waiting import until
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.states import LoopState

@@ -14,7 +14,8 @@ from typing import Any
 import matplotlib.image as mpl_image
 import numpy as np
 import pytest
-from daemon_rig import PATIENCE_S, RealDaemon, until
+from daemon_rig import PATIENCE_S, RealDaemon
+from waiting import until
 
 from tests.slower_robot import slower_robot
 

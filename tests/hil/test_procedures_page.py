@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 import test_operators_page as page_rig
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon
 from test_operators_page import playwright_api, press
+from waiting import until
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.places import SHIPPED

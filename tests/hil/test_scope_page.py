@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 import test_operators_page as page_rig
-from daemon_rig import PATIENCE_S, RealDaemon, until
+from daemon_rig import PATIENCE_S, RealDaemon
 from test_operators_page import address, opened, press
+from waiting import until
 
 from cdpr_rt.service.recording_reader import RecordingReader
 

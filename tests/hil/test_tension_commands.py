@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import until
 
 from cdpr_profiles import load_winch
 from cdpr_profiles.places import SHIPPED
@@ -96,10 +97,7 @@ def winch(folder: Path, plant: str) -> Iterator[tuple[str, Path]]:
 
 def without_power(board: PhysicsBoard) -> None:
     """Wait until the winch has no power. Bus time stands for half a second after the last SYNC."""
-    end = time.monotonic() + 60.0
-    while board.axis(0).state().power_on:
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    until(lambda: not board.axis(0).state().power_on)
 
 
 def gain(result: dict[str, Any], true: float) -> None:

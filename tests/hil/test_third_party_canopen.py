@@ -12,9 +12,8 @@ import struct
 import subprocess
 import sys
 import threading
-import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +23,7 @@ import canopen
 import pytest
 from tolerant_drive import NAME as TOLERANT
 from tolerant_drive import write_tolerant_drive
+from waiting import until
 
 from cdpr_profiles import load_winch
 from cdpr_sim_bus.bus.hub import Hub
@@ -39,15 +39,6 @@ LONGEST_S = 60.0
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lengthen the package's timeout of 0.3 s, because drives may have to wait for a core."""
     monkeypatch.setattr(canopen.sdo.SdoClient, "RESPONSE_TIMEOUT", LONGEST_S)
-
-
-def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return condition()
 
 
 def cdpr(*words: str) -> subprocess.CompletedProcess[str]:
@@ -201,7 +192,7 @@ def test_a_third_party_servo_is_enabled_and_disabled(empty_bus: str, tmp_path: P
         states = servo.states
         assert states[states.index(0x21) :][:3] == [0x21, 0x23, 0x27]
         assert states[-1] == 0x40
-        assert wait_for(lambda: servo.node.nmt.state == "PRE-OPERATIONAL")
+        until(lambda: servo.node.nmt.state == "PRE-OPERATIONAL")
 
 
 # -- our drives with a third-party master
@@ -258,13 +249,13 @@ def test_python_cans_logger_records_and_its_player_repeats_a_session(
         assert logger.stdout is not None
         assert b"Connected to" in logger.stdout.readline()
         node.nmt.state = "PRE-OPERATIONAL"
-        assert wait_for(lambda: _ask(node) == 0 and log.exists() and log.stat().st_size > 0)
+        until(lambda: _ask(node) == 0 and log.exists() and log.stat().st_size > 0)
         node.sdo[0x6072].raw = 321
         node.nmt.state = "OPERATIONAL"
         network.sync.transmit()
         # it is complete when much more has been written
         size = log.stat().st_size
-        assert wait_for(lambda: _ask(node) == 0 and log.stat().st_size > size + 16384)
+        until(lambda: _ask(node) == 0 and log.stat().st_size > size + 16384)
     messages = list(can.LogReader(str(log)))
     identifiers = [message.arbitration_id for message in messages]
     assert {0x000, 0x080, 0x602, 0x582, 0x282} <= set(identifiers)
@@ -282,7 +273,7 @@ def test_python_cans_logger_records_and_its_player_repeats_a_session(
         assert played.returncode == 0, played.stderr
         # the played answers and those of the drive, none taken for that to another request
         count = identifiers.count(0x582) + identifiers.count(0x602)
-        assert wait_for(lambda: len(answers) == count), (len(answers), count)
+        until(lambda: len(answers) == count)
         assert node.sdo[0x6072].raw == 321
 
 

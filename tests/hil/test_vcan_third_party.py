@@ -6,14 +6,14 @@ import re
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
+from waiting import until
 
 from cdpr_profiles import load_drive
 from cdpr_sim_bus.bus.client import LocalNode, raw_can_socket
@@ -30,15 +30,6 @@ SEEN = {0x000, 0x080, 0x080 + NODE, 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x
 """Identifiers that the logger must record, from boot to fault."""
 _LOGGER_S = 240.0
 _LONGEST_S = 60.0
-
-
-def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.02)
-    return condition()
 
 
 @contextmanager
@@ -81,9 +72,9 @@ def test_a_third_party_master_enables_a_drive_while_python_cans_logger_records(
         logger = subprocess.Popen(command, stdout=printed)
     try:
         with on_vcan(SimDrive(EDS, NODE, Plant())), third_party() as network:
-            assert wait_for(lambda: "Connected to" in log.read_text(), _LOGGER_S)
+            until(lambda: "Connected to" in log.read_text(), _LOGGER_S)
             network.scanner.search(10)
-            assert wait_for(lambda: network.scanner.nodes == [NODE])
+            until(lambda: network.scanner.nodes == [NODE])
             node = network.add_node(BaseNode402(NODE, str(EDS)))
             node.sdo.RESPONSE_TIMEOUT = _LONGEST_S
             node.TIMEOUT_SWITCH_OP_MODE = node.TIMEOUT_SWITCH_STATE_FINAL = _LONGEST_S
@@ -102,10 +93,10 @@ def test_a_third_party_master_enables_a_drive_while_python_cans_logger_records(
             codes: list[int] = []
             node.emcy.add_callback(lambda error: codes.append(error.code))
             node.sdo[0x2F00][1].raw = 0xFF01
-            assert wait_for(lambda: codes == [0xFF01])
-            assert wait_for(node.is_faulted)
+            until(lambda: codes == [0xFF01])
+            until(node.is_faulted)
         # the logger ends only after it has written all waiting frames
-        assert wait_for(lambda: identifiers(log) >= SEEN, _LOGGER_S)
+        until(lambda: identifiers(log) >= SEEN, _LOGGER_S)
     finally:
         logger.send_signal(2)
         logger.communicate(timeout=120)

@@ -8,12 +8,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.writer import Writer
+from waiting import until
 
 from cdpr_drivers.decode.candump import read_log
 from cdpr_tools.repeat import Run, Stops, compare, processes_of
@@ -40,13 +40,6 @@ def verified(*arguments: str | Path, status: int) -> dict[str, Any]:
     assert done.returncode == status, done.stderr
     result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return result
-
-
-def wait_until(done: Callable[[], bool]) -> None:
-    end = time.monotonic() + SLOW_S
-    while not done():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def test_a_motion_is_identical_beside_busy_and_with_stopped_processes(tmp_path: Path) -> None:
@@ -102,8 +95,8 @@ def test_ctrl_c_leaves_no_process(tmp_path: Path) -> None:
         cdpr("sim", "verify", "--keep", keep, "--", script), stderr=subprocess.PIPE, text=True
     )
     work = keep / "run-1" / "files"
-    wait_until((work / "begun").exists)
-    wait_until(lambda: len(processes_of(work)) == 3)  # a shell, its child and the sleep
+    until((work / "begun").exists)
+    until(lambda: len(processes_of(work)) == 3)  # a shell, its child and the sleep
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=SLOW_S)
     assert process.returncode == 1 and "cdpr: stopped on request, in run 1" in told
@@ -127,7 +120,7 @@ def test_processes_are_stopped_one_at_a_time_and_continue() -> None:
             time.sleep(0.005)
         assert most == 1 and 0.1 < stops.held_s < time.monotonic() - began
         stops.release()
-        wait_until(lambda: stopped() == 0)
+        until(lambda: stopped() == 0)
     finally:
         for one in sleeping:
             one.kill()

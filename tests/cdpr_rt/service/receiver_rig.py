@@ -54,13 +54,6 @@ def robot(key: bytes | None = None, host: str = "127.0.0.1") -> Iterator[Robot]:
         one.stream.stop()
 
 
-def until(what: Callable[[], bool], seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "not in time"
-        time.sleep(0.005)
-
-
 def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 60.0) -> None:
     """Stream at about 100 Hz until `what`."""
     deadline = time.monotonic() + seconds

@@ -82,10 +82,3 @@ def stock_messages(path: Path, topic: str) -> list[tuple[int, dict[str, Any]]]:
 def stock_cycles(*paths: Path) -> list[int]:
     """Return the cycle numbers in files, one after the other."""
     return [row["cycle"] for path in paths for _, row in stock_messages(path, "/cycle")]
-
-
-def wait_until(done: object, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():  # type: ignore[operator]
-        assert time.monotonic() < end
-        time.sleep(0.02)

@@ -8,13 +8,14 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
+from waiting import until
 
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.core.states import LoopState
@@ -196,7 +197,7 @@ class Rig:
     def wait_for_renewal(self, by_s: float) -> None:
         """Wait until the right holds for `by_s` longer than now."""
         now_s = self.lease_until_s
-        wait_for(lambda: self.lease_until_s > now_s + by_s)
+        until(lambda: self.lease_until_s > now_s + by_s)
 
 
 @contextmanager
@@ -207,13 +208,6 @@ def running(folder: Path) -> Iterator[Rig]:
         yield rig
     finally:
         rig.stop()
-
-
-def wait_for(seen: Callable[[], bool], seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not seen():
-        assert time.monotonic() < deadline, "never came true"
-        time.sleep(0.01)
 
 
 def raw(rig: Rig, text: bytes, wait_s: float = 5.0, port: int = 0) -> bytes:

@@ -14,13 +14,14 @@ from types import SimpleNamespace
 
 import httpx
 import pytest
+from waiting import until
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from cdpr_rt.service import access_control
 from cdpr_rt.service.access_control import AccessPolicy, is_own_host
 from cdpr_rt.service.listening import ListenError, listen_tcp, listen_unix, listener_pid
-from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig
 
 THROTTLE_S = 0.2
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
@@ -169,7 +170,7 @@ def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
             connection.recv(60.0)
     except InvalidStatus as refused:
         return refused.response.status_code
-    wait_for(lambda: rig.service.lease.holder() is None)
+    until(lambda: rig.service.lease.holder() is None)
     return 101
 
 

@@ -18,11 +18,12 @@ from typing import Any
 
 import httpx
 import pytest
+from waiting import until
 
 from cdpr_rt.service import access_control
 from cdpr_rt.service import http_server as server
 from cdpr_rt.service.access_control import AccessControl, AccessPolicy, Tickets
-from tests.cdpr_rt.service.service_rig import KEY, Rig, raw, reachable, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig, raw, reachable
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
@@ -79,7 +80,7 @@ def test_idle_connections_are_closed_in_favour_of_new_ones(rig: Rig, kind: str) 
     finally:
         for sock in silent:
             sock.close()
-    wait_for(lambda: reachable(rig))
+    until(lambda: reachable(rig))
 
 
 @pytest.mark.parametrize("kind", ["unix", "tcp"])
@@ -94,11 +95,11 @@ def test_only_a_limited_number_of_idle_connections_per_client_is_kept(
             with suppress(ConnectionError):  # the service closed it while it was idle
                 sock.sendall(b"HEAD /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
                 sock.recv(4096)
-        wait_for(lambda: sum(map(_has_ended, kept)) == more, 5.0)
+        until(lambda: sum(map(_has_ended, kept)) == more, 5.0)
     finally:
         for sock in kept:
             sock.close()
-    wait_for(lambda: reachable(rig))
+    until(lambda: reachable(rig))
 
 
 def _has_ended(sock: socket.socket) -> bool:
@@ -125,13 +126,13 @@ def test_waiting_requests_of_one_client_block_neither_others_nor_its_stop(rig: R
             assert other.get("/events").status_code == 200
         asking = ThreadPoolExecutor(1)
         stop = asking.submit(httpx.post, f"{rig.guarded_url}/hold", headers=RIGHT, timeout=60.0)
-        wait_for(lambda: int(rig.block.counters["urgent"][0]) > 0)
+        until(lambda: int(rig.block.counters["urgent"][0]) > 0)
         rig.loop.answers = True
         assert stop.result(60.0).status_code == 200
     finally:
         for sock in busy:
             sock.close()
-    wait_for(lambda: reachable(rig))
+    until(lambda: reachable(rig))
 
 
 GUESSING = """

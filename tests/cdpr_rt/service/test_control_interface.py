@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 import pytest
 from pydantic import ValidationError
+from waiting import until
 
 from cdpr_rt.service import http_models as models
 from cdpr_rt.service.listening import listen_udp
@@ -20,7 +21,7 @@ from cdpr_rt.service.setpoint_stream import SetpointStream
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import Standing, StreamSession
 from cdpr_rt.service.websocket_routes import Order
-from tests.cdpr_rt.service.service_rig import NOT_TIGHT, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import NOT_TIGHT, Rig
 
 
 def take(client: httpx.Client, name: str = "maria", ttl_s: float = 10.0) -> dict[str, str]:
@@ -111,13 +112,13 @@ def test_only_the_holder_of_the_right_is_given_a_stream_session(rig: Rig) -> Non
             assert (told["host"], told["port"]) == stream.address
             given = StreamSession(told["session"], bytes.fromhex(told["key"]))
             with StreamClient(told["host"], told["port"], given) as hand:
-                wait_for(lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != [])
+                until(lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != [])
                 assert hand.state is not None
                 assert hand.state.standing is Standing.ACCEPTED
                 client.delete("/control", headers=headers)
                 take(client, "jan")
                 answered = hand.answered
-                wait_for(
+                until(
                     lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != []
                     and hand.answered > answered + 2
                 )  # fmt: skip
@@ -182,7 +183,7 @@ def test_the_right_outlasts_a_long_command_but_not_a_client_that_disconnects(rig
         headers = take(client, ttl_s=5.0)
         with pytest.raises(httpx.ReadTimeout):
             client.post("/enable", json={}, headers=headers, timeout=httpx.Timeout(60.0, read=0.6))
-    wait_for(lambda: rig.lease_left_s < 0.0)
+    until(lambda: rig.lease_left_s < 0.0)
 
 
 def test_a_refusal_of_the_loop_is_returned_with_its_state(rig: Rig) -> None:
@@ -217,7 +218,7 @@ def test_simultaneous_holds_are_one_command(rig: Rig, monkeypatch: pytest.Monkey
     threads = [threading.Thread(target=ask) for _ in range(20)]
     for thread in threads:
         thread.start()
-    wait_for(lambda: len(asked) == 20)
+    until(lambda: len(asked) == 20)
     rig.loop.answers = True
     for thread in threads:
         thread.join()
@@ -260,7 +261,7 @@ def test_a_dead_loop_is_reported_also_to_waiting_clients(own_rig: Rig) -> None:
 
     waiting = threading.Thread(target=ask)
     waiting.start()
-    wait_for(lambda: int(rig.block.counters["commands"][0]) == 1)
+    until(lambda: int(rig.block.counters["commands"][0]) == 1)
     process.kill()
     waiting.join()
     assert answers[0].status_code == 503
@@ -381,7 +382,7 @@ def test_the_last_of_several_changed_values_is_an_event_with_its_client(rig: Rig
             return [one["text"] for one in events if one["text"].startswith("set feed")]
 
         changing_s = time.monotonic() - began_s
-        wait_for(lambda: "set feed 0.5 of idle by maria" in found())
+        until(lambda: "set feed 0.5 of idle by maria" in found())
         assert len(found()) <= 1 + int(changing_s)  # a value that stays for a second is an event
 
 

@@ -13,11 +13,12 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from waiting import until
 
 from cdpr_rt.service import setpoint_stream, stream_client
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import StreamSetpoint
-from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot, until
+from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot
 from tests.cdpr_rt.service.stream_session_rig import KEY, StreamRig
 
 HEAD = struct.Struct("<4sBBHI")

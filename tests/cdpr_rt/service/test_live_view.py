@@ -18,6 +18,7 @@ import jsonschema_rs
 import numpy as np
 import pytest
 from foxglove.messages import Timestamp
+from waiting import until
 from websockets.asyncio.client import connect
 
 from cdpr_rt.core.cycle_row import Row
@@ -266,19 +267,12 @@ def _frame(head: int, data: bytes) -> bytes:
     return struct.pack(">BBH4x", head, 0xFE, len(data)) + data
 
 
-def _cut_off(view: LiveView) -> bool:
-    end = time.monotonic() + LONGEST_S
-    while view.status()["viewers"] and time.monotonic() < end:
-        time.sleep(0.01)
-    return not view.status()["viewers"]
-
-
 def test_a_viewer_that_never_reads_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(foxglove_view, "_TIMEOUT_S", 0.2)
     monkeypatch.setattr(foxglove_view, "_MOST_UNSENT_BYTES", 4096)
     block = block_with_clock()
     with running(block) as view, repeating(block, made_rows(100, 1)), _joined(view):
-        assert _cut_off(view)
+        until(lambda: not view.status()["viewers"], LONGEST_S)
         assert view.status()["error"] == ""
 
 
@@ -288,7 +282,7 @@ def test_a_viewer_that_floods_the_view_is_disconnected(head: int) -> None:
         with suppress(ConnectionError):
             for _ in range(100):  # 13 MB: more than the limit even if all of it is read
                 viewer.sendall(_frame(head, b"x" * 125) * 1000)
-        assert _cut_off(view)
+        until(lambda: not view.status()["viewers"], LONGEST_S)
         assert view.status()["error"] == ""
 
 

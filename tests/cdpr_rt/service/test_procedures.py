@@ -16,12 +16,13 @@ from typing import Any
 
 import httpx
 import pytest
+from waiting import until
 
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.loop.right import PublishedRight
 from cdpr_rt.service.lease import Lease
 from cdpr_rt.service.procedure_runner import Procedure, ProcedureError, ProcedureRunner
-from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 COMMISSION = {"procedure": "commission", "axes": ["left"], "detached": True, "client": "maria"}
@@ -53,7 +54,7 @@ def folder(rig: Rig, tmp_path: Path) -> Iterator[Path]:
     rig.service.procedures.plan = plan
     yield tmp_path
     (tmp_path / "done").touch()
-    wait_for(lambda: not job(rig)["running"])
+    until(lambda: not job(rig)["running"])
     rig.service.procedures.plan = None
 
 
@@ -78,13 +79,13 @@ def test_a_procedure_takes_the_buses_reports_progress_and_serves_its_report(
 ) -> None:
     with in_control(rig) as token:
         assert ask(rig, COMMISSION, **token).json()["running"]
-        wait_for(lambda: job(rig)["steps"] == [{"what": "slow sweeps", "share": 0.5}])
-        wait_for(lambda: job(rig)["lines"] == ["True drum turns"])
+        until(lambda: job(rig)["steps"] == [{"what": "slow sweeps", "share": 0.5}])
+        until(lambda: job(rig)["lines"] == ["True drum turns"])
         assert [one["do"] for one in rig.loop.commands] == ["release"]
         second = ask(rig, COMMISSION, **token)
         assert (second.status_code, second.json()["error"]) == (409, "commissioning is running")
         (folder / "done").touch()
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
         assert [one["do"] for one in rig.loop.commands] == ["release", "configure", "check"]
     ended = job(rig)
     assert ended["result"] == {"ok": True, "stops": []}
@@ -96,7 +97,7 @@ def test_a_procedure_takes_the_buses_reports_progress_and_serves_its_report(
 def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path, how: str) -> None:
     with in_control(rig, 2.0 if how == "its client" else 10.0) as token:
         assert ask(rig, COMMISSION, **token).status_code == 200
-        wait_for(lambda: job(rig)["steps"])
+        until(lambda: job(rig)["steps"])
         if how == "the right":
             url = f"{rig.guarded_url}/control"
             assert httpx.delete(url, headers={**RIGHT, **token}).status_code == 200
@@ -104,7 +105,7 @@ def test_a_cancel_a_stop_or_a_lost_right_ends_a_procedure(rig: Rig, folder: Path
             method, path = how.split()
             answer = httpx.request(method, f"{rig.guarded_url}{path}", headers=RIGHT)
             assert answer.status_code == 200
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
     assert job(rig)["result"] == {"ok": False, "stops": [1]}
     assert job(rig)["error"].startswith("ended: ")
 
@@ -119,7 +120,7 @@ def test_a_procedure_that_reports_nonsense_is_killed_before_the_buses_are_taken_
     )
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
         assert "could not be read" in job(rig)["error"]
         assert [one["do"] for one in rig.loop.commands] == ["release", "configure", "check"]
     rig.service.procedures.plan = None
@@ -128,15 +129,15 @@ def test_a_procedure_that_reports_nonsense_is_killed_before_the_buses_are_taken_
 def test_nobody_boots_the_drives_that_a_procedure_runs(rig: Rig, folder: Path) -> None:
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)
-        wait_for(lambda: job(rig)["steps"])
+        until(lambda: job(rig)["steps"])
         answer = httpx.post(f"{rig.guarded_url}/configure", headers=RIGHT)
         assert (answer.status_code, job(rig)["running"]) == (409, True)
         assert "a procedure runs the drives" in answer.json()["error"]
         assert [one["do"] for one in rig.loop.commands] == ["release"]
         rig.loop.publish(released=True)
-        wait_for(lambda: rig.service.status()["released"])
+        until(lambda: rig.service.status()["released"])
         rig.service.procedures.cut("emergency stop")
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
         assert not rig.service.status()["released"]  # anybody may boot the drives now
         rig.loop.publish(released=False)
 
@@ -144,11 +145,11 @@ def test_nobody_boots_the_drives_that_a_procedure_runs(rig: Rig, folder: Path) -
 def test_a_dead_service_takes_its_procedure_with_it(rig: Rig, folder: Path) -> None:
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)
-        wait_for(lambda: job(rig)["steps"])
+        until(lambda: job(rig)["steps"])
         process = rig.service.procedures._process
         assert process is not None and process.stdin is not None
         process.stdin.close()  # as the kernel does
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
     assert job(rig)["result"] == {"ok": False, "stops": [2]}
 
 
@@ -214,7 +215,7 @@ def test_while_a_procedure_moves_the_robot_its_client_cannot(rig: Rig, tmp_path:
 
     with in_control(rig) as token:
         assert ask(rig, COMMISSION, **token).status_code == 200
-        wait_for(lambda: job(rig)["lines"])
+        until(lambda: job(rig)["lines"])
         assert "measurement of poses moves the robot" in jog(token).json()["error"]
         lent = {"X-Control-Token": job(rig)["lines"][0]}
         assert jog(lent).status_code == 200
@@ -223,7 +224,7 @@ def test_while_a_procedure_moves_the_robot_its_client_cannot(rig: Rig, tmp_path:
         url = f"{rig.guarded_url}/control"
         assert httpx.put(url, headers={**RIGHT, **token}).status_code == 200
         httpx.delete(f"{rig.guarded_url}/procedure", headers=RIGHT)
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
         assert jog(lent).status_code == 409
         assert jog(token).status_code == 200
     rig.service.procedures.plan = None
@@ -238,7 +239,7 @@ def test_a_procedure_that_was_stopped_moves_the_robot_no_more_while_it_ends(
     )
     with in_control(rig) as token:
         assert ask(rig, COMMISSION, **token).status_code == 200
-        wait_for(lambda: job(rig)["lines"])
+        until(lambda: job(rig)["lines"])
         lent = {**RIGHT, "X-Control-Token": job(rig)["lines"][0]}
         assert httpx.post(f"{rig.guarded_url}/hold", headers=RIGHT).status_code == 200
         body = {"program": "jog", "wanted": {}}
@@ -247,7 +248,7 @@ def test_a_procedure_that_was_stopped_moves_the_robot_no_more_while_it_ends(
         assert "stops under control" in answer.json()["error"]
         assert job(rig)["running"]
         (tmp_path / "done").touch()
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
     rig.service.procedures.plan = None
 
 
@@ -296,7 +297,7 @@ def test_no_file_but_those_of_a_report_is_served(rig: Rig, folder: Path) -> None
     (folder / "done").touch()
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)
-        wait_for(lambda: not job(rig)["running"])
+        until(lambda: not job(rig)["running"])
     root = rig.guarded_url + job(rig)["reports"][0]["path"].rpartition("/")[0]
     for name in ("..%2fsecret.html", "link.html", "raw.bin", "%2fetc%2fpasswd", "", "nothing.html"):
         assert httpx.get(f"{root}/{name}").status_code == 404, name
@@ -310,7 +311,7 @@ def test_the_curves_of_a_log_that_is_being_written_are_read(rig: Rig, folder: Pa
     header = {"format": "cdpr-rt raw log", "version": 1, "columns": columns, "period_s": 0.001}
     with in_control(rig) as token:
         ask(rig, COMMISSION, **token)
-        wait_for(lambda: job(rig)["steps"])
+        until(lambda: job(rig)["steps"])
         raw = folder / "left" / "raw"
         raw.mkdir(parents=True)
         text = json.dumps({**header, "what": "sweep", "rows": None}).encode().ljust(4095) + b"\n"

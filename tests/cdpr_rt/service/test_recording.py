@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from waiting import until
 
 from cdpr_rt.core.cycle_row import FIELDS, WALL_TIMES
 from cdpr_rt.core.shared_block import RowWriter
@@ -24,7 +25,6 @@ from tests.cdpr_rt.service.recording_rig import (
     run_for,
     stock_cycles,
     stock_messages,
-    wait_until,
 )
 
 
@@ -287,10 +287,10 @@ def test_events_record_changes_with_their_reasons(tmp_path: Path) -> None:
     recorder.start()
     writer = RowWriter(block)
     put(writer, rows[:65])
-    wait_until(lambda: recorder.status()["rows"] == 65)
+    until(lambda: recorder.status()["rows"] == 65)
     block.write_status({"state": "fault", "reason": "right: 31 N below 40 N"})
     put(writer, rows[65:])
-    wait_until(lambda: recorder.status()["rows"] == 100)
+    until(lambda: recorder.status()["rows"] == 100)
     recorder.remark("stopped by somebody", client="panel", at=float("nan"), by=Path("x"))
     recorder.stop()
     events = [value for _, value in stock_messages(Path(recorder.status()["file"]), "/events")]

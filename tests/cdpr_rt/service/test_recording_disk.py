@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
+from waiting import until
 
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.service.recording import Recorder, reserve_of
@@ -20,7 +21,6 @@ from tests.cdpr_rt.service.recording_rig import (
     put,
     run_for,
     stock_cycles,
-    wait_until,
 )
 
 pytestmark = pytest.mark.long
@@ -79,7 +79,7 @@ def test_rows_reach_the_disk_although_new_ones_keep_arriving(tmp_path: Path) -> 
     recorder.start()
     thread.start()
     try:
-        wait_until(lambda: int(block.counters["recorded"][0]) > 0)
+        until(lambda: int(block.counters["recorded"][0]) > 0)
     finally:
         end.set()
         thread.join()
@@ -91,7 +91,7 @@ def test_a_file_that_is_removed_ends_the_recording(tmp_path: Path) -> None:
     recorder = Recorder(block_with_clock(), folder, "bench")
     recorder.start()
     shutil.rmtree(folder)
-    wait_until(lambda: recorder.status()["error"])
+    until(lambda: recorder.status()["error"])
     recorder.stop()
     assert "001.mcap: recording ended: the file has been removed" in recorder.status()["error"]
 
@@ -139,7 +139,7 @@ def test_recording_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=1 << 60, ended=ends.append)
     recorder.start()
     put(RowWriter(block), made_rows(0, 10))
-    wait_until(lambda: recorder.status()["error"])
+    until(lambda: recorder.status()["error"])
     recorder.stop()
     assert "GB free, less than the 1.15e+09 GB reserved" in recorder.status()["error"] and ends == [
         recorder.status()["error"]

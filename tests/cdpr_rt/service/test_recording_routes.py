@@ -13,13 +13,14 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
+from waiting import until
 
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.service.recording import Recorder
 from cdpr_rt.service.recording_folder import RecordingFolder
 from cdpr_rt.service.recording_reader import CLOSED, KILLED, RecordingReader
 from tests.cdpr_rt.service.recording_rig import DESCRIPTION, made_rows
-from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig
 
 ROBOT = "bench"
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
@@ -179,7 +180,7 @@ def test_slow_reading_delays_nothing_and_ends_with_its_client(
         began_s = time.monotonic()
         assert http.get("/status").status_code == 200
         assert time.monotonic() - began_s < 1.0
-    wait_for(lambda: recordings._readers.total() == 0, 20.0)
+    until(lambda: recordings._readers.total() == 0, 20.0)
 
 
 def test_two_recordings_are_downloaded_at_a_time_and_block_no_curves(
@@ -193,7 +194,7 @@ def test_two_recordings_are_downloaded_at_a_time_and_block_no_curves(
             waiting.enter_context(closing(connection))
             connection.request("GET", f"{path}/table.csv", headers=RIGHT)
         readers = rig.service.recordings._readers
-        wait_for(lambda: readers.total() == 2)
+        until(lambda: readers.total() == 2)
         answer = http.get(f"{path}/table.csv")
         assert answer.status_code == 409
         assert "already being read" in answer.json()["error"]

@@ -11,8 +11,9 @@ from typing import Any
 
 import httpx
 import pytest
+from waiting import until
 
-from tests.cdpr_rt.service.service_rig import KEY, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import KEY, Rig
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
@@ -81,7 +82,7 @@ def test_a_stop_taken_by_the_loop_is_one_event_and_cancels_planning(rig: Rig) ->
         assert client.post("/path", json={"name": "a.nc", "text": ""}).status_code == 200
         for taken in (1, 2):
             rig.loop.publish(stops={"taken": taken, "do": "hold", "client": "maria@lab"})
-            wait_for(lambda taken=taken: noted() == [("command", taken)])  # type: ignore[misc]
+            until(lambda taken=taken: noted() == [("command", taken)])  # type: ignore[misc]
         planned.set()
-        wait_for(lambda: not client.get("/path").json()["planning"])
+        until(lambda: not client.get("/path").json()["planning"])
         assert "hold by maria@lab" in client.get("/path").json()["error"]

@@ -13,11 +13,12 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from waiting import until
 
 from cdpr_rt.service.listening import ListenError, listen_udp
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import Standing
-from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot, until
+from tests.cdpr_rt.service.receiver_rig import Robot, converse, robot
 from tests.cdpr_rt.service.stream_session_rig import KEY
 
 

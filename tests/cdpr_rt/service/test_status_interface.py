@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
+from waiting import until
 
 from cdpr_rt.service.listening import listen_udp
 from cdpr_rt.service.setpoint_stream import SetpointStream
-from tests.cdpr_rt.service.service_rig import AXES, Rig, wait_for
+from tests.cdpr_rt.service.service_rig import AXES, Rig
 
 
 class Unstartable:
@@ -28,7 +29,7 @@ def test_the_status_reports_parts_that_have_failed(own_rig: Rig) -> None:
     stream = SetpointStream(service.block, service.lease, sock, ended=ended)
     sock.close()
     service.start_parts([Unstartable(), stream])  # type: ignore[list-item]  # it gets no further
-    wait_for(lambda: bool(stream.status()["error"]))
+    until(lambda: bool(stream.status()["error"]))
     with own_rig.client() as client:
         parts = client.get("/status").json()["parts"]
         events = [event["text"] for event in client.get("/events").json()["events"]]
@@ -43,7 +44,7 @@ def test_status_is_strict_json_with_every_axis(rig: Rig) -> None:
 
     rig.loop.publish(reason_limit={"value": float("nan")}, driving=False)
     with rig.client() as client:
-        wait_for(lambda: client.get("/status").json()["cycle"] is not None)
+        until(lambda: client.get("/status").json()["cycle"] is not None)
         status = json.loads(client.get("/status").text, parse_constant=refuse)
     assert status["reason_limit"] == {"value": None}
     assert status["driving"] is False
@@ -55,19 +56,19 @@ def test_status_is_strict_json_with_every_axis(rig: Rig) -> None:
 
 def test_events_are_reported_in_order(rig: Rig) -> None:
     with rig.client() as client:
-        wait_for(lambda: bool(client.get("/events").json()["events"]))
+        until(lambda: bool(client.get("/events").json()["events"]))
         last = client.get("/events").json()["events"][-1]["number"]
         for _ in range(3):
             client.post("/hold", json={"client": "maria"})
         rig.loop.publish(state="fault", reason="speed of left: 9 rad/s, 5 allowed")
-        wait_for(lambda: client.get("/status").json()["state"] == "fault")
+        until(lambda: client.get("/status").json()["state"] == "fault")
         found: list[dict[str, Any]] = []
 
         def told() -> bool:
             found[:] = client.get("/events", params={"after": last}).json()["events"]
             return len(found) == 3
 
-        wait_for(told)
+        until(told)
     assert [event["kind"] for event in found] == ["command", "state", "reason"]
     assert (found[0]["text"], found[0]["times"]) == ("hold by maria", 3)
     assert "5 allowed" in found[2]["text"]
@@ -76,7 +77,7 @@ def test_events_are_reported_in_order(rig: Rig) -> None:
 def test_prometheus_parser_reads_the_metrics_and_every_cycle_is_counted(own_rig: Rig) -> None:
     rig = own_rig
     with rig.client() as client:
-        wait_for(lambda: int(rig.block.counters["rows"][0]) > 500)
+        until(lambda: int(rig.block.counters["rows"][0]) > 500)
         rig.loop.stand_still()
         cycles = int(rig.block.counters["rows"][0])
         samples: dict[Any, float] = {}
@@ -92,7 +93,7 @@ def test_prometheus_parser_reads_the_metrics_and_every_cycle_is_counted(own_rig:
             assert seen <= cycles
             return seen == cycles
 
-        wait_for(counted)
+        until(counted)
     counted = samples[("cdpr_cycle_compute_seconds_count", ())]
     assert samples[("cdpr_cycles_total", ())] == cycles
     assert samples[("cdpr_cycle_compute_seconds_sum", ())] == pytest.approx(counted * 1e-4)

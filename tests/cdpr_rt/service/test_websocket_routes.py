@@ -16,12 +16,13 @@ from urllib.parse import quote
 import httpx
 import pytest
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from waiting import until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect, unix_connect
 
 from cdpr_rt.service import websocket_routes
 from cdpr_rt.service import websocket_routes as control_socket
-from tests.cdpr_rt.service.service_rig import AXES, KEY, NOT_TIGHT, Rig, running, wait_for
+from tests.cdpr_rt.service.service_rig import AXES, KEY, NOT_TIGHT, Rig, running
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +146,7 @@ def test_a_client_that_answers_no_ping_is_dropped_without_a_traceback(
     monkeypatch.setattr(protocol, "start_keepalive", protocol.keepalive_timeout)
     with open_unix(rig, "/live?rate_Hz=50") as connection:
         assert closed_for(connection) == (1011, "keepalive ping timeout")
-    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+    until(lambda: rig.service.counts["live_clients"] == 0)
     assert caplog.text == ""
 
 
@@ -160,13 +161,13 @@ def test_only_the_client_that_does_not_read_is_dropped(rig: Rig) -> None:
     )
     with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
         deadline = time.monotonic() + 300.0
-        wait_for(lambda: rig.service.counts["live_clients"] == 2)
+        until(lambda: rig.service.counts["live_clients"] == 2)
         while rig.service.counts["live_clients"] == 2:
             connection.recv(60.0)
             assert time.monotonic() < deadline
         json.loads(connection.recv(60.0))
     asleep.close()
-    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+    until(lambda: rig.service.counts["live_clients"] == 0)
     assert rig.service.counts["slow_clients_dropped"] == dropped + 1  # before a ping was missed
 
 
@@ -194,11 +195,11 @@ def test_one_address_may_watch_with_many_pages_up_to_a_limit(rig: Rig) -> None:
         for _ in range(websocket_routes._MOST_LIVE):
             page = connect(f"ws://{url}/live?rate_Hz=1", additional_headers=key)
             watching.enter_context(page)
-        wait_for(lambda: rig.service.counts["live_clients"] == websocket_routes._MOST_LIVE)
+        until(lambda: rig.service.counts["live_clients"] == websocket_routes._MOST_LIVE)
         assert httpx.get(f"http://{url}/description", headers=key).status_code == 200
         with open_unix(rig, "/live") as connection:
             assert closed_for(connection)[0] == control_socket.BUSY
-    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+    until(lambda: rig.service.counts["live_clients"] == 0)
 
 
 def test_few_viewers_may_watch_every_cycle(rig: Rig) -> None:
@@ -210,7 +211,7 @@ def test_few_viewers_may_watch_every_cycle(rig: Rig) -> None:
             code, why = closed_for(connection)
             assert (code, "every cycle" in why) == (control_socket.BUSY, True)
         watching.enter_context(open_unix(rig, "/live")).recv(60.0)
-    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+    until(lambda: rig.service.counts["live_clients"] == 0)
 
 
 # -- moving
@@ -235,7 +236,7 @@ def test_the_connection_is_the_right_to_move(rig: Rig) -> None:
         assert refused["error"].startswith("pose: the cables are not tight")
         assert ask(connection, do="set", wanted={"v": [2]})["ok"] is True
         assert rig.lease_left_s > 0.0
-    wait_for(lambda: rig.lease_until_s == 0.0)
+    until(lambda: rig.lease_until_s == 0.0)
     assert [command["do"] for command in rig.loop.commands] == ["program", "program", "set"]
     assert rig.loop.commands[2]["client"] == "maria"
 
@@ -245,11 +246,11 @@ def test_a_hold_overtakes_and_cancels_earlier_requests_of_its_connection(rig: Ri
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
         connection.send(json.dumps({"do": "program", "program": "jog", "id": 0}))
-        wait_for(lambda: len(rig.service.link._pending) == 1)
+        until(lambda: len(rig.service.link._pending) == 1)
         for number, order in enumerate(("set", "set", "hold", "set"), 1):
             wanted = {} if order == "hold" else {"wanted": {}}
             connection.send(json.dumps({"do": order, "id": number, **wanted}))
-        wait_for(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted too
+        until(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted too
         rig.loop.answers = True
         answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(5))}
         assert [answers[i]["ok"] for i in range(5)] == [False, False, False, True, True]
@@ -273,12 +274,12 @@ def test_a_stop_by_another_client_cancels_orders_that_wait(rig: Rig) -> None:
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
         connection.send(json.dumps({"do": "program", "program": "jog", "id": 0}))
-        wait_for(lambda: len(rig.service.link._pending) == 1)
+        until(lambda: len(rig.service.link._pending) == 1)
         connection.send(json.dumps({"do": "program", "program": "jog", "id": 1}))
         assert ask(connection, do="jump", id=2)["ok"] is False  # so the order before is waiting
         stopping = Thread(target=lambda: rig.client().post("/hold", json={"client": "jan"}))
         stopping.start()
-        wait_for(lambda: len(rig.service.link._pending) == 2)
+        until(lambda: len(rig.service.link._pending) == 2)
         rig.loop.answers = True
         answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(2))}
         stopping.join()
@@ -291,9 +292,9 @@ def test_a_client_that_disconnects_while_waiting_loses_the_right_immediately(rig
     with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
         connection.recv(60.0)
         connection.send(json.dumps({"do": "set", "wanted": {}}))
-        wait_for(lambda: len(rig.service.link._pending) == 1)
+        until(lambda: len(rig.service.link._pending) == 1)
         connection.socket.shutdown(socket.SHUT_RDWR)
-        wait_for(lambda: rig.lease_until_s == 0.0)
+        until(lambda: rig.lease_until_s == 0.0)
 
 
 def test_a_client_waiting_for_an_answer_keeps_the_right(
@@ -369,7 +370,7 @@ def test_binary_messages_close_the_connection_without_a_traceback(
         connection.recv(60.0)
         connection.send(b'{"do": "\xff"}', text=True)
         assert closed_for(connection)[0] == 1007
-    wait_for(lambda: rig.lease_left_s < 0.0)
+    until(lambda: rig.lease_left_s < 0.0)
     assert caplog.text == ""
     assert rig.loop.commands == []
 
@@ -383,10 +384,10 @@ def test_a_message_too_long_or_too_many_messages_end_the_connection(
         connection.recv(60.0)
         connection.send("x" * 20_000)
         assert closed_for(connection)[0] == 1009
-    wait_for(lambda: rig.lease_left_s < 0.0)
+    until(lambda: rig.lease_left_s < 0.0)
     with open_unix(rig, "/control?client=maria") as connection:
         connection.recv(60.0)
         for _ in range(150):
             connection.send('{"do": "renew"}')
         assert closed_for(connection)[0] == control_socket.UNFIT
-    wait_for(lambda: rig.lease_left_s < 0.0)
+    until(lambda: rig.lease_left_s < 0.0)

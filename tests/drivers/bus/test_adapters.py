@@ -16,6 +16,7 @@ import can
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from waiting import until
 
 from cdpr_drivers.bus import BusHealth, BusState, BusUrl, FramePort, open_port
 from cdpr_drivers.bus.frames import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
@@ -101,10 +102,7 @@ def test_an_adapter_is_opened_with_the_expected_commands(start: Start) -> None:
     port = open_port(adapter.url)
     assert adapter.lines == [b"", b"C", b"V", b"S8", b"O", b"F"]
     port.close()
-    deadline = time.monotonic() + 60.0
-    while adapter.lines[-1] != b"C":
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: adapter.lines[-1] == b"C")
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
 from fork_server import FORKED
+from waiting import until
 
 from tests.sim_bus.cia402.drive_rig import EDS, NODE
 
@@ -61,7 +61,7 @@ def start(node: BaseNode402) -> None:
     states: list[int] = []
     node.nmt.add_heartbeat_callback(states.append)
     node.nmt.send_command(129)
-    assert wait_for(lambda: 0 in states), "no boot-up message"
+    until(lambda: 0 in states)
     node.sdo[0x1017].raw = 50
     node.nmt.wait_for_heartbeat(timeout=60)
     node.rpdo.read()
@@ -84,17 +84,8 @@ def start(node: BaseNode402) -> None:
     node.network.sync.start(0.01)
 
 
-def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return condition()
-
-
 def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
-    assert wait_for(lambda: node.state == "SWITCH ON DISABLED")
+    until(lambda: node.state == "SWITCH ON DISABLED")
     for name in ("PROFILED TORQUE", "CYCLIC SYNCHRONOUS TORQUE", "PROFILED POSITION"):
         assert node.is_op_mode_supported(name)
         node.op_mode = name
@@ -117,17 +108,17 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     # The zero is at the index, 123.4° from the initial rotor angle.
     # The rotor must be at rest, because the two values are read one after the other.
     stood = -round(123.4 / 360 * 8192)
-    assert wait_for(lambda: abs(node.sdo[0x6064].raw - node.sdo[0x6063].raw - stood) <= 10)
+    until(lambda: abs(node.sdo[0x6064].raw - node.sdo[0x6063].raw - stood) <= 10)
 
     emergencies: list[int] = []
     node.emcy.add_callback(lambda error: emergencies.append(error.code))
     node.sdo[0x2F00][1].raw = 0xFF01
-    assert wait_for(node.is_faulted)
-    assert wait_for(lambda: emergencies == [0xFF01])
+    until(node.is_faulted)
+    until(lambda: emergencies == [0xFF01])
     assert node.sdo[0x603F].raw == 0xFF01
     node.reset_from_fault()
     assert node.state == "OPERATION ENABLED"
-    assert wait_for(lambda: emergencies == [0xFF01, 0x0000])
+    until(lambda: emergencies == [0xFF01, 0x0000])
     node.state = "SWITCH ON DISABLED"
 
 
@@ -137,7 +128,7 @@ def test_a_master_can_use_the_default_mapping(node: BaseNode402) -> None:
     boot_ups: list[int] = []
     node.nmt.add_heartbeat_callback(boot_ups.append)
     node.nmt.send_command(129)
-    assert wait_for(lambda: 0 in boot_ups)
+    until(lambda: 0 in boot_ups)
     node.setup_402_state_machine()
     node.nmt.state = "OPERATIONAL"
     node.network.sync.start(0.01)

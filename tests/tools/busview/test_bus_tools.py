@@ -10,12 +10,13 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import pytest
 from cdpr_here import cdpr_here
+from waiting import until
 
 from tests.tools.busview.bus_lab import PROBE, WINCH, Lab, begin, command, last_json
 
@@ -56,18 +57,11 @@ class Session:
             jog = ("drive", "jog", WINCH, "--bus", lab.bus, "--speed-deg-s", "90")
             assert cdpr_here(*jog, "--seconds", "0.5").returncode == 0
             self.heard = lab.passed(ear)
-            wait_until(lambda: self.log.read_text().count(" 7FE#") == 2)  # markers of both
+            until(lambda: self.log.read_text().count(" 7FE#") == 2)  # markers of both
             monitor.send_signal(signal.SIGINT)
             _, self.errors = monitor.communicate(timeout=120)
         assert monitor.returncode == 0, self.errors
         self.lines = shown.read_text().splitlines()
-
-
-def wait_until(seen: Callable[[], object]) -> None:
-    until = time.monotonic() + 120
-    while not seen():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def wait_for_log(log: Path, bus: can.BusABC) -> None:
@@ -77,7 +71,7 @@ def wait_for_log(log: Path, bus: can.BusABC) -> None:
         bus.send(PROBE)
         return log.exists() and log.stat().st_size > 0
 
-    wait_until(logs)
+    until(logs)
 
 
 @pytest.fixture(scope="module")
@@ -306,7 +300,7 @@ def test_a_reader_that_does_not_read_loses_no_frame_of_the_log(lab: Lab, tmp_pat
                 bus.send(can.Message(arbitration_id=0x7FD, data=[i] * 8, is_extended_id=False))
             time.sleep(0.01)
         lab.passed(bus)
-    wait_until(lambda: log.read_text().count(" 7FD#") == 6000)
+    until(lambda: log.read_text().count(" 7FD#") == 6000)
     monitor.send_signal(signal.SIGINT)
     out, errors = monitor.communicate(timeout=120)
     assert "frames were lost" not in errors

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cdpr_here import cdpr_here
+from waiting import until
 
 from cdpr_profiles import Robot
 from cdpr_sim_bus.cia402.faults import FAULTS
@@ -201,18 +201,11 @@ def test_a_campaign_that_is_ended_leaves_no_processes_and_files(how: int, tmp_pa
         [*command, "--workers", "1"], env=environment, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     ) as campaign:  # fmt: skip
-        _wait_until(lambda: any(tmp_path.glob("cdpr-campaign-*/plant.toml")))
+        until(lambda: any(tmp_path.glob("cdpr-campaign-*/plant.toml")))
         os.killpg(campaign.pid, how) if how == signal.SIGINT else campaign.kill()
         said, _ = campaign.communicate(timeout=60.0)  # until no process has the pipe
     assert "Traceback" not in said
     assert not list(tmp_path.glob("cdpr-*"))
-
-
-def _wait_until(done: Callable[[], bool], within_s: float = 60.0) -> None:
-    end_s = time.monotonic() + within_s
-    while not done():
-        assert time.monotonic() < end_s
-        time.sleep(0.05)
 
 
 @pytest.mark.long

@@ -19,6 +19,7 @@ import can
 import canopen
 import pytest
 from cdpr_here import cdpr_here
+from waiting import until
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import ProfileError, load_drive
@@ -165,10 +166,8 @@ def test_an_enabled_drive_gets_no_node_id() -> None:
         node.sdo[0x6060].raw = 10
         for word in (6, 7, 15):
             node.sdo[0x6040].raw = word
-            end = time.monotonic() + 60.0
             state = {6: 0x21, 7: 0x23, 15: 0x27}[word]
-            while node.sdo[0x6041].raw & 0x6F != state:
-                assert time.monotonic() < end
+            until(lambda state=state: node.sdo[0x6041].raw & 0x6F == state)
         message = refused(1, f"simbus:{name}", "--alone", "--node-id", "9")
         assert "node 1 has its power stage enabled: stop the other master first" in message
         assert node.sdo[0x6041].raw & 0x6F == 0x27

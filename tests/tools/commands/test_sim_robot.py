@@ -14,6 +14,7 @@ import can
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from waiting import until
 
 from cdpr_drivers.camera.camera import open_camera
 from cdpr_profiles import ProfileError
@@ -78,10 +79,8 @@ class Robot:
         for _ in range(count):
             self.bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
             time.sleep(0.01)
-        until = time.monotonic() + 120.0
-        while len(seen := records(self.log)) < before + count:
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        until(lambda: len(records(self.log)) >= before + count, 120.0)
+        seen = records(self.log)
         assert len(seen) == before + count
         return seen[-1]
 
@@ -260,10 +259,8 @@ def test_the_platform_starts_with_the_orientation_in_the_robots_file(tmp_path: P
         for _ in range(5):
             bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
             time.sleep(0.01)
-        until = time.monotonic() + 120.0
-        while not len(seen := records(log)):
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        until(lambda: len(records(log)), 120.0)
+        seen = records(log)
     assert {bus["truth_log"] for bus in simulator.ready["buses"].values()} == {str(log)}
     assert np.allclose(seen[0]["rotation"], turned, atol=2e-3)
     assert np.allclose(seen[0]["position_m"], (0.0, 0.0, 0.5), atol=2e-3)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from waiting import until
 
 from cdpr_rt.service.service import DriveTextsError
 from cdpr_tools.daemon.drive_texts import RobotDriveTexts
-from tests.cdpr_rt.service.service_rig import running, wait_for
+from tests.cdpr_rt.service.service_rig import running
 from tests.tools.robot_rig import robot_file
 
 
@@ -18,7 +19,7 @@ def test_a_robots_file_that_was_spoilt_meanwhile_is_named(tmp_path: Path) -> Non
     path.write_text("spoilt")
     with running(tmp_path) as rig, rig.client() as client:
         rig.service.drives = texts = RobotDriveTexts(str(path))
-        wait_for(lambda: rig.block.counters["rows"][0] > 0)
+        until(lambda: rig.block.counters["rows"][0] > 0)
         answer = client.get("/drives")
         assert answer.status_code == 409
         assert path.name in answer.json()["error"]

@@ -16,6 +16,7 @@ from typing import Any
 
 import launcher_rig
 import pytest
+from waiting import until
 
 from cdpr_tools.daemon.loop_file import LauncherLock, LoopFile
 from cdpr_tools.errors import BadInputError
@@ -95,9 +96,7 @@ class Daemon:
 
     def starves(self) -> None:
         """Wait until the watchdog is no longer fed."""
-        end = time.monotonic() + TIMEOUT_S
-        while self.fed(0.6):
-            assert time.monotonic() < end
+        until(lambda: not self.fed(0.6), TIMEOUT_S)
 
     def pid(self, who: str) -> int:
         return int((self.folder / f"{who}.pid").read_text())
@@ -146,13 +145,6 @@ def _is_child(pid: int) -> bool:
         return False
 
 
-def _gone(pid: int) -> bool:
-    end = time.monotonic() + TIMEOUT_S
-    while _is_child(pid) and time.monotonic() < end:
-        time.sleep(0.02)
-    return not _is_child(pid)
-
-
 def test_notifications_are_repeated_until_systemd_accepts_them(start: Start) -> None:
     daemon = start({"stopping_s": 1.0, "loading_s": 0.5}, watchdog_s=0.4)
     daemon.stuff()  # before the first notification
@@ -183,10 +175,7 @@ def test_a_dead_or_hanging_service_is_restarted_and_the_loop_continues(
     loop, service = daemon.pid("loop"), daemon.pid("service")
     os.kill(service, number)
     assert told in daemon.line("told")["told"]
-    end = time.monotonic() + TIMEOUT_S
-    while daemon.pid("service") == service and time.monotonic() < end:
-        time.sleep(0.02)
-    assert daemon.pid("service") != service
+    until(lambda: daemon.pid("service") != service, TIMEOUT_S)
     assert daemon.pid("loop") == loop
     assert _is_child(loop)
 
@@ -393,10 +382,7 @@ def test_a_file_of_another_daemon_is_not_removed(start: Start) -> None:
 
 def test_ending_the_daemon_while_the_loop_loads_succeeds(start: Start) -> None:
     daemon = start({"loading_s": 30.0})
-    end = time.monotonic() + TIMEOUT_S
-    while not (daemon.folder / "loop.pid").exists():
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    until((daemon.folder / "loop.pid").exists, TIMEOUT_S)
     daemon.process.terminate()
     assert daemon.line("reason")["reason"] == ""
     assert daemon.ends() == 0
@@ -438,6 +424,6 @@ def test_loop_and_service_end_after_their_launcher_was_killed(start: Start) -> N
     daemon.line("ready")
     loop, service = daemon.pid("loop"), daemon.pid("service")
     daemon.process.kill()
-    assert _gone(loop)
-    assert _gone(service)
+    until(lambda: not _is_child(loop), TIMEOUT_S)
+    until(lambda: not _is_child(service), TIMEOUT_S)
     assert sorted(daemon.log()) == ["loop stopped", "service stopped"]

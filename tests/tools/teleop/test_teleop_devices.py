@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from scipy.spatial.transform import Rotation
+from waiting import until
 
 from cdpr_rt.service.stream_packet import REACH_M
 from cdpr_tools.errors import BadInputError
@@ -205,10 +206,11 @@ def read_soon(device: InputDevice, what: str) -> InputSample:
 
 def wait_for_bytes(terminal: int, count: int) -> None:
     """Wait until `count` typed bytes can be read."""
-    end = time.monotonic() + 60.0
-    while int.from_bytes(fcntl.ioctl(terminal, termios.FIONREAD, bytes(4)), sys.byteorder) < count:
-        assert time.monotonic() < end
-        time.sleep(0.005)
+
+    def waiting() -> int:
+        return int.from_bytes(fcntl.ioctl(terminal, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+    until(lambda: waiting() >= count)
 
 
 def test_a_terminal_moves_the_hand_and_its_settings_are_restored() -> None:
