@@ -123,3 +123,7 @@ class PlatformJog(JogProgram):
         self._parts.slacken()
         self._parts.last_stop.take()
         super().start(feedback, setpoint, torque_Nm)
+
+    def progress(self) -> dict[str, Any]:
+        """Return also that the cables are not known to be tight."""
+        return {"tight": False, **super().progress()}

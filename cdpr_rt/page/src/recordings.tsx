@@ -64,7 +64,7 @@ function Row({ one }: { one: RecordingFile }) {
         <a class="button" href={linkTo("scope", { file: one.name })}>Plot</a>
         <button onClick={save("")}>Download MCAP</button>
         <button onClick={save("/table.csv")}>Download CSV</button>
-        <button onClick={save("/picture.png")}>Draw picture</button>
+        <button onClick={save("/picture.png")}>Download picture</button>
       </div>
     </li>
   );

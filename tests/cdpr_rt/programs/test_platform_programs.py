@@ -143,6 +143,13 @@ def test_tightening_and_lowering_subtract_no_learnt_loss_from_tensions(robot: St
     assert not control.compensation_Nm.any()
 
 
+def test_a_jog_tells_that_the_cables_are_not_tight(robot: Standing):
+    robot.switch("jog", {"velocity_rad_s": [0.0, 0.0, 0.0], "duration_s": 0.1})
+    robot.run(0.2)
+    progress = robot.programs["jog"].progress()
+    assert progress["tight"] is False and progress["done"] == 1.0
+
+
 def test_positions_need_tight_cables_and_idle_needs_loose_ones(robot: Standing):
     pose, idle = robot.programs["pose"], robot.programs["idle"]
     with pytest.raises(ProgramError, match="cables are not tight; run tighten first"):
