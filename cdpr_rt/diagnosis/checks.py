@@ -420,7 +420,7 @@ def _singular(statics: PlatformStatics) -> str:
             return f"{text}: all {name} lie in one line{left_out}"
         in_plane = dimensions == 2 and len(spread) == 3
         if in_plane and points is statics.exits_m and _is_upright(points):
-            return f"{text}: all {name} lie in one upright plane"
+            return f"{text}: all {name} lie in one vertical plane"
     return f"{text}: anchor points elsewhere on the platform help"
 
 

@@ -175,7 +175,7 @@ def largest_jump(normalised: FloatArray, settled: FloatArray, share: float) -> t
     """Return the largest change of residuals from their low-passed values, m, and its cable.
 
     `normalised` (n,) are those of `largest_residual`; `settled` (n,) follow them by `share` per
-    cycle and start from them if NaN. The cable is -1 if the change of another residual comes near.
+    cycle and start from them if NaN. The cable is -1 if another residual changes almost as much.
     """
     largest, second, index = 0.0, 0.0, -1
     for i in range(normalised.size):

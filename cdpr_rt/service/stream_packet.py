@@ -254,7 +254,7 @@ def seal(packet: Packet, key: bytes) -> bytes:
 
 
 def stream_key(shared: bytes) -> bytes:
-    """Return the key of the stream, derived from a shared key for any use.
+    """Return the key of the stream, derived from the daemon's key `shared`.
 
     Raises ControlError for a key that is too short.
     """

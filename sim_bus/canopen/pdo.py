@@ -1,4 +1,4 @@
-"""PDOs of a slave: reception and transmission of each, and the work at SYNC and between.
+"""PDOs of a slave: how each is received and sent, at SYNC and between SYNCs.
 
 Received frames are written to the dictionary at the SYNC or immediately, and their deadlines are
 monitored. Mapped objects are sampled and sent as the transmission types of CiA 301 specify.

@@ -448,7 +448,7 @@ def what_matters_is_noticed(j: Judge) -> Iterator[str]:
     slipped = [cause.axis for cause in j.causes if cause.name in _LENGTHENS]
     allowed_m = _OFF_m + float(predicted(j.played.scenario.robot).off_m[slipped].max(initial=0.0))
     if _longest(off_m > allowed_m) * j.robot.sync_period_s > _NOTICED_S:
-        yield f"the platform is up to {off_m.max():.3f} m from where it says"
+        yield f"the platform is up to {off_m.max():.3f} m from the reported position"
 
 
 def _off_m(j: Judge, moves: BoolArray) -> FloatArray:
@@ -515,7 +515,7 @@ def works_again(j: Judge) -> Iterator[str]:
 
 
 def no_exception(j: Judge) -> Iterator[str]:
-    """An exception in the loop is a mistake of the program, whatever breaks."""
+    """The loop must not raise an exception, whatever breaks."""
     if "Traceback" in j.played.output or "Error:" in j.played.output:
         yield f"exception: {j.played.output[-800:]}"
     for reply in j.played.replies:

@@ -157,7 +157,8 @@ def compare_runs(
 
     R2 is the share of the torque's variance that the curve over the angle explains. Recordings in
     FOLDER itself are marked: the curves were identified from them. Hysteresis shifts static maps,
-    and the direction that was not identified. A second line gives R2 at the best shift up to 1 deg.
+    and curves of a direction that was not identified. A second line gives R2 at the best shift, up
+    to 1 deg.
     """
     out = Output(as_json)
     profile = CoggingProfile.load(Paths(folder).profile)

@@ -1,4 +1,4 @@
-"""Recordings of other programs as recordings that `cdpr log` lists, draws and exports."""
+"""Convert recordings of other programs for `cdpr log`, which lists, draws and exports them."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ class RobotKind:
 
     @property
     def side_m(self) -> float:
-        """Greatest distance of two anchor points."""
+        """Greatest distance between two anchor points."""
         return max(math.dist(*pair) for pair in combinations(self.platform.anchor_points_m, 2))
 
     def exits_m(self, frame_m: tuple[float, ...]) -> list[tuple[float, ...]]:
@@ -465,7 +465,7 @@ def _side(kind: RobotKind) -> Question:
     if kind.turns_freely:
         text = "Side of the triangle on which the cables end (m; 0 if all end in one point)"
     else:
-        text = "Greatest distance of two anchor points on the platform (m)"
+        text = "Greatest distance between two anchor points on the platform (m)"
     least = 0.0 if kind.turns_freely else 0.01
 
     def default(answers: Answers) -> Default:

@@ -254,8 +254,8 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
         f"tensions   hold the platform in {held} % of the box; targets are accepted in {taken} % "
-        f"of it, because there tensions in motion keep the control's reserve of {kept:.0f} N to "
-        f"their limits{least}",
+        f"of it, where tensions in motion stay at least {kept:.0f} N inside their limits, a "
+        f"reserve for the control{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
     lines.append(f"resonance  of rotors and platform through the cables at {lowest:.1f} Hz or more")
