@@ -159,22 +159,26 @@ class Judge:
             subject = predicted(self.played.scenario.robot).subject
             place = self.truth["position_m"][before, : subject.model.positions]
             sudden_m = slips(subject, [place])[cause.axis].sudden_m
-            return pulled > 1.0 and 1e-3 * amount > _OVER * sudden_m
+            wide = 1e-3 * amount > _OVER * sudden_m
+            return pulled > 1.0 and wide and not self._loose(cause.at_s, before)
         if cause.name == "encoder-jump":
             turns = abs(amount) / self.robot.axes[cause.axis].winch.encoder_counts_per_turn
             return turns * math.tau > _SURE_JUMP_rad
         if cause.name == "silence":
             tolerated_s = self.limits.missed_cycles * self.robot.sync_period_s
             return 1e-3 * amount > 2.0 * tolerated_s
-        return cause.name == "cut-cable" and pulled > 2.0 and not self._set_down(cause.at_s, before)
+        return cause.name == "cut-cable" and pulled > 2.0 and not self._loose(cause.at_s, before)
 
-    def _set_down(self, at_s: float, record: int) -> bool:
-        """Return whether a lowered platform stood on its stand, where its cables become slack."""
-        programs = [s["program"] for s in self.played.statuses if s["at_s"] <= at_s]
+    def _loose(self, at_s: float, record: int) -> bool:
+        """Return whether cables might be slack: on the stand, or where none counts as tight."""
+        last = [status for status in self.played.statuses if status["at_s"] <= at_s][-1]
         platform = self.robot.platform
         assert platform is not None  # campaigns are for robots with a platform
         above_m = self.truth["position_m"][record, self.up] - platform.home_m[self.up]
-        return bool(programs) and programs[-1] == "lower" and bool(above_m < _STANDS_m)
+        untight = (last["program_progress"] or {}).get("tight") is False
+        return (last["program"] == "lower" and bool(above_m < _STANDS_m)) or (
+            last["program"] in ("hold", "jog") and untight
+        )
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""

@@ -422,7 +422,7 @@ _COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
 """Commands to the loop for each next step that the status names."""
 _STATUS_KEYS: Final = (
     "state", "reason", "reason_limit", "faults", "program", "driving", "reacting", "busy",
-    "last_stop", "notices", "failure", "count",
+    "last_stop", "notices", "failure", "count", "program_progress",
 )  # fmt: skip
 
 

@@ -170,6 +170,17 @@ def test_the_tension_of_a_motor_that_disobeys_is_not_predicted(day: tuple[Played
         assert ("tensions_are_predicted" in found) is judged
 
 
+def test_a_large_slip_must_be_named_unless_cables_may_be_slack(day: tuple[Played, Robot]) -> None:
+    played, robot = day
+    slip = {**played.scenario.faults[0], "fault": "slip", "value": 900.0}
+    slipped = replace(played.scenario, faults=(slip,))
+    for tight, missed in ((True, True), (False, False)):
+        held = {"faults": [], "program": "hold", "program_progress": {"tight": tight}}
+        statuses = [status | held for status in played.statuses]
+        found = judge(replace(played, scenario=slipped, statuses=statuses), robot).violations
+        assert any(one.startswith("causes_are_named") for one in found) is missed
+
+
 def test_only_a_frozen_encoder_hides_the_speed_of_its_winch(day: tuple[Played, Robot]) -> None:
     played, robot = day
     calm = replace(played, statuses=[s | {"faults": []} for s in played.statuses])
