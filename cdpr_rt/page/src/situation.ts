@@ -148,7 +148,8 @@ function activeOf(status: Status, description: Description | null, interrupted: 
       ? situation("busy", stage ?? "Lowering the platform", progress.trouble)
       : situation("ready", "On its stand", "The cables are loose, the power is on", "tighten");
   }
-  if (description?.platform && progress.tight === false) return slackOf(status, description);
+  const jogs = status.program === "jog" && (progress.done ?? 0) < 1;
+  if (description?.platform && progress.tight === false && !jogs) return slackOf(status, description);
   if (status.program === "path" && progress.path?.waiting) return situation("on", "Paused on the path", progress.path.waiting === "paused" ? "Resume it in the card Path" : progress.path.waiting);
   if (progress.done !== undefined && progress.done < 1 && status.program !== "hold") {
     return situation("busy", stage ?? "Moving", progress.held_back || progress.missing || progress.trouble);
