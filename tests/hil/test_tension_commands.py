@@ -219,7 +219,7 @@ def test_invalid_calibration_options_are_rejected(tmp_path: Path) -> None:
         (("--masses", "2,5,50"), "up to 10.6 kg"),
         (
             ("--sensors", "rtu-load-cell-1", "--tension-port", "x", "--highest-n", "200"),
-            "up to 104 N",
+            "at most 104 N",
         ),
         (("--masses", "nan,2,5"), "at least three different masses"),
         (("--masses", "2,5,5.0,9"), "at least three different masses"),

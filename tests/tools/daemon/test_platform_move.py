@@ -66,6 +66,7 @@ class Told:
             done |= {"done": 0.0, **self.ways.pop(0)}
         return {
             "state": "active",
+            "loop": {"silent_s": 0.0},
             "program": "pose",
             "reason": "",
             "reacting": "none",
