@@ -170,15 +170,17 @@ class Judge:
         return cause.name == "cut-cable" and pulled > 2.0 and not self._loose(cause.at_s, before)
 
     def _loose(self, at_s: float, record: int) -> bool:
-        """Return whether cables might be slack: on the stand, or where none counts as tight."""
-        last = [status for status in self.played.statuses if status["at_s"] <= at_s][-1]
+        """Return whether cables might be slack: on the stand, or while none counts as tight."""
+        then = [status for status in self.played.statuses if status["at_s"] <= at_s]
+        if not then:
+            return True
+        program, progress = then[-1]["program"], then[-1]["program_progress"] or {}
+        if program in ("hold", "jog"):
+            return progress.get("tight") is False
         platform = self.robot.platform
         assert platform is not None  # campaigns are for robots with a platform
         above_m = self.truth["position_m"][record, self.up] - platform.home_m[self.up]
-        untight = (last["program_progress"] or {}).get("tight") is False
-        return (last["program"] == "lower" and bool(above_m < _STANDS_m)) or (
-            last["program"] in ("hold", "jog") and untight
-        )
+        return program == "lower" and bool(above_m < _STANDS_m)
 
     def falls(self) -> list[Fall]:
         """Return when and how far the platform came down while no motor had torque."""
